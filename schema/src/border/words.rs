@@ -1,0 +1,31 @@
+//! The closed sets of words (enumerations), between the wire and the map's types, both ways.
+
+use mapfold_map::{level, raster, vector};
+
+use crate::v1;
+
+/// Conversions between two enumerations with the same variants.
+macro_rules! same_words {
+    ($ours:ty, $theirs:ty, $($word:ident),+) => {
+        impl From<$theirs> for $ours {
+            fn from(word: $theirs) -> Self {
+                match word {
+                    $(<$theirs>::$word => Self::$word,)+
+                }
+            }
+        }
+
+        impl From<$ours> for $theirs {
+            fn from(word: $ours) -> Self {
+                match word {
+                    $(<$ours>::$word => Self::$word,)+
+                }
+            }
+        }
+    };
+}
+
+same_words!(v1::Facing, vector::Facing, Origin, Away);
+same_words!(v1::EndKind, vector::EndKind, Corner, Jump, Occluded);
+same_words!(v1::SensorClass, raster::SensorClass, Scanner, Sonar);
+same_words!(v1::Provenance, level::Provenance, Datum, SharedMap, Odometry);

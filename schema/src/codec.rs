@@ -1,0 +1,197 @@
+//! JSON for people, CBOR for robots, the same types behind both.
+//!
+//! In CBOR, UUIDs are byte strings of 16 and fractional numbers are floats of any width (never
+//! integers); all else is as in JSON.
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::border::Violation;
+use crate::v1;
+
+/// Media type of JSON.
+pub const JSON: &str = "application/json";
+/// Media type of CBOR.
+pub const CBOR: &str = "application/cbor";
+
+/// A body that is not what it should be.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum DecodeError {
+    /// Neither JSON nor CBOR.
+    #[error("the media type {0} is not known here: send {JSON} or {CBOR}")]
+    MediaType(String),
+    /// Not well-formed JSON.
+    #[error("the body is not well-formed JSON: {0}")]
+    Json(String),
+    /// Not well-formed CBOR.
+    #[error("the body is not well-formed CBOR: {0}")]
+    Cbor(String),
+    /// Well-formed, but not the expected shape there.
+    #[error("the body does not have the expected shape at \"{}\": {}", .0.pointer, .0.detail)]
+    Shape(Violation),
+}
+
+/// A value that cannot be written: a fault of ours, not of input.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("cannot encode: {0}")]
+pub struct EncodeError(String);
+
+/// One of the two formats.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Json,
+    Cbor,
+}
+
+impl Format {
+    /// The format of a media type with or without parameters, in any case.
+    fn of(media_type: &str) -> Option<Self> {
+        let essence = media_type.split(';').next().unwrap_or_default().trim();
+        if essence.eq_ignore_ascii_case(JSON) {
+            Some(Self::Json)
+        } else if essence.eq_ignore_ascii_case(CBOR) {
+            Some(Self::Cbor)
+        } else {
+            None
+        }
+    }
+}
+
+/// Writes `value` in the format of `media_type` ([`JSON`] or [`CBOR`]).
+///
+/// # Errors
+/// Another media type; a type that the format cannot hold.
+pub fn encode<T: Serialize>(media_type: &str, value: &T) -> Result<Vec<u8>, EncodeError> {
+    match Format::of(media_type) {
+        Some(Format::Json) => to_json(value),
+        Some(Format::Cbor) => to_cbor(value),
+        None => Err(EncodeError(format!("{media_type} is neither {JSON} nor {CBOR}"))),
+    }
+}
+
+/// Reads a body of `media_type`, which may bear parameters.
+///
+/// # Errors
+/// Another media type; what does not fit, with its place.
+pub fn decode<T: DeserializeOwned>(media_type: &str, bytes: &[u8]) -> Result<T, DecodeError> {
+    match Format::of(media_type) {
+        Some(Format::Json) => from_json(bytes),
+        Some(Format::Cbor) => from_cbor(bytes),
+        None => Err(DecodeError::MediaType(media_type.to_owned())),
+    }
+}
+
+/// Reads an upload: one contribution, or an array of them. The flag says whether it was an array,
+/// because the answer is then an array too. How many there may be is not decided here.
+///
+/// # Errors
+/// Another media type; what does not fit, with its place.
+pub fn decode_uploads(
+    media_type: &str,
+    bytes: &[u8],
+) -> Result<(Vec<v1::Contribution>, bool), DecodeError> {
+    let format =
+        Format::of(media_type).ok_or_else(|| DecodeError::MediaType(media_type.to_owned()))?;
+    let is_array = match format {
+        Format::Json => bytes.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'['),
+        // The upper three bits of a CBOR item's first byte are its major type; 4 is an array.
+        Format::Cbor => bytes.first().is_some_and(|b| b >> 5 == 4),
+    };
+    let uploads = match (format, is_array) {
+        (Format::Json, true) => from_json(bytes)?,
+        (Format::Json, false) => vec![from_json(bytes)?],
+        (Format::Cbor, true) => from_cbor(bytes)?,
+        (Format::Cbor, false) => vec![from_cbor(bytes)?],
+    };
+    Ok((uploads, is_array))
+}
+
+/// Writes JSON.
+///
+/// # Errors
+/// A type that JSON cannot hold.
+pub fn to_json<T: Serialize>(value: &T) -> Result<Vec<u8>, EncodeError> {
+    serde_json::to_vec(value).map_err(|e| EncodeError(e.to_string()))
+}
+
+/// Reads JSON. Numbers come back bit for bit as they were written.
+///
+/// # Errors
+/// What does not fit, with its place.
+pub fn from_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, DecodeError> {
+    serde_json::from_slice(bytes).map_err(|error| json_error::<T>(bytes, &error))
+}
+
+/// Writes CBOR: maps with field names as keys, in the order of the type's fields, so that equal
+/// values give equal bytes.
+///
+/// # Errors
+/// A type that CBOR cannot hold.
+pub fn to_cbor<T: Serialize>(value: &T) -> Result<Vec<u8>, EncodeError> {
+    minicbor_serde::to_vec(value).map_err(|e| EncodeError(e.to_string()))
+}
+
+/// Reads CBOR: one item and nothing behind it.
+///
+/// # Errors
+/// What does not fit, with its place.
+pub fn from_cbor<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, DecodeError> {
+    let mut deserializer = minicbor_serde::Deserializer::new(bytes);
+    let value =
+        T::deserialize(&mut deserializer).map_err(|error| cbor_error::<T>(bytes, &error))?;
+    match bytes.len() - deserializer.decoder().position() {
+        0 => Ok(value),
+        rest => Err(DecodeError::Cbor(format!("{rest} bytes follow the item"))),
+    }
+}
+
+/// Why reading JSON failed. Only now is the body read again with its path kept: the way without
+/// fault pays nothing for it.
+fn json_error<T: DeserializeOwned>(bytes: &[u8], error: &serde_json::Error) -> DecodeError {
+    if !error.is_data() {
+        return DecodeError::Json(error.to_string());
+    }
+    let mut deserializer = serde_json::Deserializer::from_slice(bytes);
+    match serde_path_to_error::deserialize::<_, T>(&mut deserializer) {
+        Ok(_) => DecodeError::Json(error.to_string()),
+        Err(traced) => shape(traced.path(), traced.inner()),
+    }
+}
+
+/// Why reading CBOR failed, like [`json_error`]. minicbor does not tell bad bytes from bad shapes,
+/// so the item is skipped first: what can be skipped whole is well-formed.
+fn cbor_error<T: DeserializeOwned>(
+    bytes: &[u8],
+    error: &minicbor_serde::error::DecodeError,
+) -> DecodeError {
+    let mut deserializer = minicbor_serde::Deserializer::new(bytes);
+    let skipped = deserializer.decoder_mut().skip();
+    if skipped.is_err() || deserializer.decoder().position() != bytes.len() {
+        return DecodeError::Cbor(error.to_string());
+    }
+    let mut deserializer = minicbor_serde::Deserializer::new(bytes);
+    match serde_path_to_error::deserialize::<_, T>(&mut deserializer) {
+        Ok(_) => DecodeError::Cbor(error.to_string()),
+        Err(traced) => shape(traced.path(), traced.inner()),
+    }
+}
+
+fn shape(path: &serde_path_to_error::Path, error: &impl ToString) -> DecodeError {
+    use serde_path_to_error::Segment;
+    let mut pointer = String::new();
+    for step in path {
+        let step = match step {
+            Segment::Seq { index } => index.to_string(),
+            // A key may be anything that the body holds.
+            Segment::Map { key } => key.replace('~', "~0").replace('/', "~1"),
+            Segment::Enum { .. } | Segment::Unknown => continue,
+        };
+        pointer.push('/');
+        pointer.push_str(&step);
+    }
+    DecodeError::Shape(Violation {
+        pointer,
+        code: "unexpected_shape".to_owned(),
+        detail: error.to_string(),
+    })
+}

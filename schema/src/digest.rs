@@ -1,0 +1,22 @@
+//! The digest by which a contribution's content is known.
+
+use std::fmt::Write as _;
+
+use sha2::{Digest, Sha256};
+
+use crate::codec::{self, EncodeError};
+use crate::v1;
+
+/// SHA-256 of the contribution's CBOR as [`codec::to_cbor`] writes it, in lower-case hexadecimal.
+/// The same content gives the same digest, whether it came as JSON or as CBOR.
+///
+/// # Errors
+/// A contribution that CBOR cannot hold (none that was decoded).
+pub fn content_digest(contribution: &v1::Contribution) -> Result<String, EncodeError> {
+    let digest = Sha256::digest(codec::to_cbor(contribution)?);
+    let mut hex = String::with_capacity(2 * digest.len());
+    for byte in digest {
+        let _ = write!(hex, "{byte:02x}"); // writing to a String cannot fail
+    }
+    Ok(hex)
+}

@@ -1,0 +1,54 @@
+//! Every path of the HTTP API, once: templates for the server, builders for the client.
+
+/// `GET, POST`: sites.
+pub const SITES: &str = "/api/v1/sites";
+/// `GET, POST`: levels of a site.
+pub const LEVELS: &str = "/api/v1/sites/{site}/levels";
+/// `GET`: one level.
+pub const LEVEL: &str = "/api/v1/sites/{site}/levels/{level}";
+/// `GET, POST`: robots of a site.
+pub const ROBOTS: &str = "/api/v1/sites/{site}/robots";
+/// `GET, PATCH`: one robot.
+pub const ROBOT: &str = "/api/v1/sites/{site}/robots/{robot}";
+/// `POST`: a token for a robot.
+pub const ROBOT_TOKENS: &str = "/api/v1/sites/{site}/robots/{robot}/tokens";
+/// `GET, POST`: the log, and uploads into it.
+pub const CONTRIBUTIONS: &str = "/api/v1/sites/{site}/levels/{level}/contributions";
+/// `GET`: one contribution.
+pub const CONTRIBUTION: &str = "/api/v1/sites/{site}/levels/{level}/contributions/{id}";
+/// `GET`: segments and clusters.
+pub const VECTOR: &str = "/api/v1/sites/{site}/levels/{level}/vector";
+/// `GET`: changed tiles.
+pub const RASTER: &str = "/api/v1/sites/{site}/levels/{level}/raster";
+/// `GET`: one tile's evidence.
+pub const RASTER_TILE: &str = "/api/v1/sites/{site}/levels/{level}/raster/{x}/{y}";
+/// `GET`: picture pyramid, `{col}` with the suffix `.png`.
+pub const TILES: &str = "/api/v1/sites/{site}/levels/{level}/tiles/{z}/{row}/{col}";
+/// `GET`: all that changed, in pages.
+pub const PATCHES: &str = "/api/v1/sites/{site}/levels/{level}/patches";
+/// `GET`: live events.
+pub const EVENTS: &str = "/api/v1/sites/{site}/levels/{level}/events";
+/// `GET`: exports.
+pub const EXPORTS: &str = "/api/v1/sites/{site}/levels/{level}/exports/{format}";
+/// `POST`, `GET`, `DELETE`: the page's session.
+pub const SESSION: &str = "/api/v1/session";
+
+/// The path of a level.
+pub fn level(site: &str, level: &str) -> String {
+    LEVEL.replace("{site}", site).replace("{level}", level)
+}
+
+/// The path of a robot.
+pub fn robot(site: &str, robot: &str) -> String {
+    ROBOT.replace("{site}", site).replace("{robot}", robot)
+}
+
+/// A template with the site and level filled in.
+pub fn of_level(template: &str, site: &str, level: &str) -> String {
+    template.replace("{site}", site).replace("{level}", level)
+}
+
+/// A template with the site filled in.
+pub fn of_site(template: &str, site: &str) -> String {
+    template.replace("{site}", site)
+}

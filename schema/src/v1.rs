@@ -1,0 +1,26 @@
+//! The types of `/api/v1`. Metres, radians; instants are RFC 3339 in UTC; ids are UUIDs.
+
+mod contribution;
+mod event;
+mod features;
+mod level;
+mod patch;
+mod receipt;
+mod robot;
+mod site;
+mod token;
+
+pub use contribution::{
+    Contribution, ContributionEntry, ContributionPage, ContributionState, EvidencePatch,
+    ObservedCluster, ObservedEnd, ObservedSegment, PoseEstimate, Provenance, TilePatch,
+};
+pub use event::LevelEvent;
+pub use features::{Cluster, EndKind, Facing, Segment, SensorClass, SolidInterval};
+pub use level::{Bounds, Counts, LevelDescription, NewLevel};
+pub use patch::{Patch, RasterChanges, Removed, TileAddress, TileEvidence, VectorPatch};
+pub use receipt::Receipt;
+pub use robot::{
+    LastPose, NewRobot, RobotDescription, RobotState, RobotUpdate, SensorKind, SensorProfile,
+};
+pub use site::{NewSite, SiteDescription};
+pub use token::{IssuedToken, NewToken, Scope};

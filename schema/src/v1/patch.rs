@@ -1,0 +1,94 @@
+//! What changed after a revision.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::{Cluster, Segment, SensorClass};
+
+/// `GET L/vector`: segments and clusters that changed after `since`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct VectorPatch {
+    /// The revision that was asked for.
+    pub since: i64,
+    /// The revision that this leads to.
+    pub revision: i64,
+    /// New or changed segments.
+    pub segments: Vec<Segment>,
+    /// New or changed clusters.
+    pub clusters: Vec<Cluster>,
+    /// What is no more.
+    pub removed: Removed,
+}
+
+/// Identities of what is no more.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+pub struct Removed {
+    /// Segments.
+    #[serde(default)]
+    pub segments: Vec<String>,
+    /// Clusters.
+    #[serde(default)]
+    pub clusters: Vec<String>,
+    /// Tiles.
+    #[serde(default)]
+    pub tiles: Vec<TileAddress>,
+}
+
+/// One layer's tile.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+pub struct TileAddress {
+    /// The layer.
+    pub sensor: SensorClass,
+    /// Tiles to the right of the level's origin.
+    pub x: i32,
+    /// Tiles up from the level's origin.
+    pub y: i32,
+}
+
+/// `GET L/raster`: which tiles changed after `since`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct RasterChanges {
+    /// The revision that was asked for.
+    pub since: i64,
+    /// The revision that this leads to.
+    pub revision: i64,
+    /// Edge of a cell.
+    pub resolution_m: f64,
+    /// New or changed tiles.
+    pub tiles: Vec<TileAddress>,
+    /// Tiles that hold no evidence any more.
+    pub removed: Vec<TileAddress>,
+}
+
+/// The evidence of one layer in one tile.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct TileEvidence {
+    /// The layer.
+    pub sensor: SensorClass,
+    /// Tiles to the right of the level's origin.
+    pub x: i32,
+    /// Tiles up from the level's origin.
+    pub y: i32,
+    /// Runs of equal evidence, flat: start, length, value, ... (64 x 64 cells, row by row from
+    /// below, 0.01 nat, sums not clamped; cells in no run are 0).
+    pub runs: Vec<i32>,
+}
+
+/// `GET L/patches`: all that changed after `since`, in pages.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Patch {
+    /// The revision that was asked for.
+    pub since: i64,
+    /// The revision that this leads to; ask with it as `since` for what follows.
+    pub revision: i64,
+    /// Whether there is more to ask for right now.
+    pub more: bool,
+    /// New or changed segments.
+    pub segments: Vec<Segment>,
+    /// New or changed clusters.
+    pub clusters: Vec<Cluster>,
+    /// New or changed tiles, whole.
+    pub tiles: Vec<TileEvidence>,
+    /// What is no more.
+    pub removed: Removed,
+}

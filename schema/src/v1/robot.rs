@@ -1,0 +1,121 @@
+//! Robots and their sensors.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// What a sensor is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SensorKind {
+    /// A range scanner with narrow beams.
+    Scanner,
+    /// A ring of ultrasonic range finders.
+    Sonar,
+}
+
+/// One sensor of a robot, as the robot declares it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SensorProfile {
+    /// What it is.
+    pub kind: SensorKind,
+    /// Make and model, for people.
+    #[serde(default)]
+    pub model: String,
+    /// Readings at or beyond this are no echo.
+    pub range_max_m: f64,
+    /// Standard deviation of a range.
+    pub range_sd_m: f64,
+    /// Standard deviation of a bearing (scanner), or full width of the cone (sonar).
+    pub beam_rad: f64,
+    /// Whether its readings are derived from those of another sensor (demonstrations).
+    #[serde(default)]
+    pub emulated: bool,
+}
+
+/// A robot to be enrolled.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewRobot {
+    /// Slug: lower-case letters, digits and hyphens.
+    pub robot: String,
+    /// Name for people; the slug if absent.
+    #[serde(default)]
+    pub name: Option<String>,
+    /// Its sensors; its competence follows from them.
+    pub sensors: Vec<SensorProfile>,
+}
+
+/// What may be changed of a robot; what is absent stays.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RobotUpdate {
+    /// Name for people.
+    #[serde(default)]
+    pub name: Option<String>,
+    /// Its sensors.
+    #[serde(default)]
+    pub sensors: Option<Vec<SensorProfile>>,
+    /// Whether what it sends goes into the map.
+    #[serde(default)]
+    pub state: Option<RobotState>,
+    /// The revision of its level that it runs, as it reports.
+    #[serde(default)]
+    pub revision: Option<i64>,
+    /// Contributions that wait in its outbox, as it reports.
+    #[serde(default)]
+    pub queue_length: Option<i64>,
+}
+
+/// Whether what a robot sends goes into the map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RobotState {
+    /// It does.
+    Active,
+    /// It is kept for review.
+    Held,
+}
+
+/// Where a robot last was.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct LastPose {
+    /// Slug of the level.
+    pub level: String,
+    /// Position, x.
+    pub x_m: f64,
+    /// Position, y.
+    pub y_m: f64,
+    /// Heading.
+    pub heading_rad: f64,
+    /// Covariance of (x, y, heading).
+    pub covariance: [[f64; 3]; 3],
+    /// When, by the robot's clock.
+    pub observed_at: String,
+}
+
+/// A robot as it is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct RobotDescription {
+    /// Slug.
+    pub robot: String,
+    /// Name for people.
+    pub name: String,
+    /// Its sensors.
+    pub sensors: Vec<SensorProfile>,
+    /// Kinds of its sensors, each once.
+    pub competence: Vec<SensorKind>,
+    /// Whether what it sends goes into the map.
+    pub state: RobotState,
+    /// Where it last was, if it ever contributed.
+    #[serde(default)]
+    pub last_pose: Option<LastPose>,
+    /// The revision that it runs, as it last reported.
+    #[serde(default)]
+    pub revision: Option<i64>,
+    /// Contributions that wait in its outbox, as it last reported.
+    #[serde(default)]
+    pub queue_length: Option<i64>,
+    /// Contributions of it that the server has.
+    pub contributions: i64,
+}
