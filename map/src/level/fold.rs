@@ -1,0 +1,176 @@
+//! The fold: from a set of contributions to a map, one contribution at a time or many.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::{Contribution, ContributionId, FeatureId, LevelMap};
+use crate::raster::{SensorClass, Tile, TileIndex, TileKey, TilePatch};
+use crate::vector::{Evidence, Things, VectorConfig, Walls};
+
+/// What a level's fold depends on besides its contributions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LevelConfig {
+    /// Edge of a cell, metres.
+    pub resolution: f64,
+    /// The vector fold's thresholds.
+    pub vector: VectorConfig,
+}
+
+impl LevelConfig {
+    /// Standard thresholds on a grid of `resolution` metres a cell.
+    pub fn standard(resolution: f64) -> Self {
+        Self { resolution, vector: VectorConfig::STANDARD }
+    }
+}
+
+/// What a fold changed: these things are new, different or gone; [`Level::map`] tells which.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Changes {
+    /// Segments.
+    pub segments: BTreeSet<FeatureId>,
+    /// Clusters.
+    pub clusters: BTreeSet<FeatureId>,
+    /// Tiles.
+    pub tiles: BTreeSet<TileKey>,
+}
+
+/// A level's map together with what the fold must remember to change it.
+#[derive(Debug, Clone)]
+pub struct Level {
+    config: LevelConfig,
+    map: LevelMap,
+    in_force: BTreeSet<ContributionId>,
+    walls: Walls,
+    things: Things,
+}
+
+/// The grid as the vector fold reads it.
+struct Grid<'a> {
+    tiles: &'a BTreeMap<TileKey, Arc<Tile>>,
+    resolution: f64,
+}
+
+impl Evidence for Grid<'_> {
+    fn tile(&self, key: TileKey) -> Option<&Tile> {
+        self.tiles.get(&key).map(AsRef::as_ref)
+    }
+
+    fn resolution(&self) -> f64 {
+        self.resolution
+    }
+}
+
+impl Level {
+    /// A level without contributions.
+    pub fn new(config: LevelConfig) -> Self {
+        Self {
+            config,
+            map: LevelMap::default(),
+            in_force: BTreeSet::new(),
+            walls: Walls::default(),
+            things: Things::default(),
+        }
+    }
+
+    /// A level from its stored tiles (the sums at some revision) and the contributions then in
+    /// force. Their evidence is in the tiles already and is not looked at, so it may be left out
+    /// of them. The same bits as folding them.
+    pub fn restore<'a>(
+        config: LevelConfig,
+        tiles: impl IntoIterator<Item = (TileKey, Tile)>,
+        contributions: impl IntoIterator<Item = &'a Contribution>,
+    ) -> Self {
+        let mut level = Self::new(config);
+        level.map.tiles = tiles
+            .into_iter()
+            .filter(|(_, tile)| !tile.is_empty())
+            .map(|(key, tile)| (key, Arc::new(tile)))
+            .collect();
+        let mut inserted: Vec<&Contribution> = contributions.into_iter().collect();
+        inserted.retain(|c| level.in_force.insert(c.id));
+        level.fold_features(&inserted, &[], Changes::default());
+        level
+    }
+
+    /// Its configuration.
+    pub fn config(&self) -> &LevelConfig {
+        &self.config
+    }
+
+    /// What is published.
+    pub fn map(&self) -> &LevelMap {
+        &self.map
+    }
+
+    /// The contributions in force.
+    pub fn in_force(&self) -> &BTreeSet<ContributionId> {
+        &self.in_force
+    }
+
+    /// Folds contributions in. One that is in force already changes nothing.
+    pub fn fold<'a>(
+        &mut self,
+        contributions: impl IntoIterator<Item = &'a Contribution>,
+    ) -> Changes {
+        let mut inserted: Vec<&Contribution> = contributions.into_iter().collect();
+        inserted.retain(|c| self.in_force.insert(c.id));
+        let tiles = self.fold_evidence(&inserted, Tile::add);
+        self.fold_features(&inserted, &[], Changes { tiles, ..Changes::default() })
+    }
+
+    /// Takes contributions out again: the map is then bit for bit what it would have been without
+    /// them. One that is not in force changes nothing. A contribution must be the very one that
+    /// was folded in.
+    pub fn unfold<'a>(
+        &mut self,
+        contributions: impl IntoIterator<Item = &'a Contribution>,
+    ) -> Changes {
+        let mut removed: Vec<&Contribution> = contributions.into_iter().collect();
+        removed.retain(|c| self.in_force.remove(&c.id));
+        let tiles = self.fold_evidence(&removed, Tile::subtract);
+        self.fold_features(&[], &removed, Changes { tiles, ..Changes::default() })
+    }
+
+    /// Applies the evidence of `contributions` by `change`; returns the touched tiles.
+    fn fold_evidence(
+        &mut self,
+        contributions: &[&Contribution],
+        change: fn(&mut Tile, &TilePatch),
+    ) -> BTreeSet<TileKey> {
+        let mut touched = BTreeSet::new();
+        for patch in contributions.iter().flat_map(|c| &c.evidence) {
+            for (tile, cells) in &patch.tiles {
+                let key = TileKey { class: patch.class, tile: *tile };
+                let sum = self.map.tiles.entry(key).or_default();
+                change(Arc::make_mut(sum), cells);
+                touched.insert(key);
+            }
+        }
+        for key in &touched {
+            if self.map.tiles.get(key).is_some_and(|tile| tile.is_empty()) {
+                self.map.tiles.remove(key);
+            }
+        }
+        touched
+    }
+
+    fn fold_features(
+        &mut self,
+        inserted: &[&Contribution],
+        removed: &[&Contribution],
+        mut changes: Changes,
+    ) -> Changes {
+        let touched: BTreeSet<TileIndex> = changes
+            .tiles
+            .iter()
+            .filter(|key| key.class == SensorClass::Scanner)
+            .map(|key| key.tile)
+            .collect();
+        let LevelMap { segments, clusters, tiles } = &mut self.map;
+        let grid = Grid { tiles, resolution: self.config.resolution };
+        let config = &self.config.vector;
+        changes.segments = self.walls.update(inserted, removed, &touched, &grid, segments, config);
+        changes.clusters = self.things.update(inserted, removed, &touched, &grid, clusters, config);
+        changes
+    }
+}

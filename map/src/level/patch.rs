@@ -1,0 +1,80 @@
+//! What changed between two states of a map. `apply` copies and never computes.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::{FeatureId, LevelMap};
+use crate::raster::{Tile, TileKey};
+use crate::vector::{Cluster, Segment};
+
+/// New and changed things whole, removed things by their identity.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Patch {
+    /// New or changed segments.
+    pub segments: BTreeMap<FeatureId, Arc<Segment>>,
+    /// New or changed clusters.
+    pub clusters: BTreeMap<FeatureId, Arc<Cluster>>,
+    /// New or changed tiles.
+    pub tiles: BTreeMap<TileKey, Arc<Tile>>,
+    /// Segments that are no more.
+    pub removed_segments: Vec<FeatureId>,
+    /// Clusters that are no more.
+    pub removed_clusters: Vec<FeatureId>,
+    /// Tiles that hold no evidence any more.
+    pub removed_tiles: Vec<TileKey>,
+}
+
+impl Patch {
+    /// Whether it changes nothing.
+    pub fn is_empty(&self) -> bool {
+        self.segments.is_empty()
+            && self.clusters.is_empty()
+            && self.tiles.is_empty()
+            && self.removed_segments.is_empty()
+            && self.removed_clusters.is_empty()
+            && self.removed_tiles.is_empty()
+    }
+}
+
+type Changed<K, V> = (BTreeMap<K, Arc<V>>, Vec<K>);
+
+fn diff_kind<K: Ord + Copy, V: PartialEq>(
+    a: &BTreeMap<K, Arc<V>>,
+    b: &BTreeMap<K, Arc<V>>,
+) -> Changed<K, V> {
+    let changed = b
+        .iter()
+        .filter(|(key, new)| a.get(key).is_none_or(|old| !Arc::ptr_eq(old, new) && old != *new))
+        .map(|(key, new)| (*key, Arc::clone(new)))
+        .collect();
+    let removed = a.keys().filter(|key| !b.contains_key(key)).copied().collect();
+    (changed, removed)
+}
+
+/// What leads from `a` to `b`: `apply(diff(a, b), a) == b`.
+pub fn diff(a: &LevelMap, b: &LevelMap) -> Patch {
+    let (segments, removed_segments) = diff_kind(&a.segments, &b.segments);
+    let (clusters, removed_clusters) = diff_kind(&a.clusters, &b.clusters);
+    let (tiles, removed_tiles) = diff_kind(&a.tiles, &b.tiles);
+    Patch { segments, clusters, tiles, removed_segments, removed_clusters, removed_tiles }
+}
+
+fn apply_kind<K: Ord + Copy, V>(
+    changed: &BTreeMap<K, Arc<V>>,
+    removed: &[K],
+    to: &mut BTreeMap<K, Arc<V>>,
+) {
+    for key in removed {
+        to.remove(key);
+    }
+    for (key, new) in changed {
+        to.insert(*key, Arc::clone(new));
+    }
+}
+
+/// Brings `map` up to date. Removing what is not there, or applying twice, does no harm.
+pub fn apply(patch: &Patch, map: &mut LevelMap) {
+    apply_kind(&patch.segments, &patch.removed_segments, &mut map.segments);
+    apply_kind(&patch.clusters, &patch.removed_clusters, &mut map.clusters);
+    apply_kind(&patch.tiles, &patch.removed_tiles, &mut map.tiles);
+}

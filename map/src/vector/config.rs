@@ -1,0 +1,59 @@
+//! What the fold of segments and clusters depends on besides the observations.
+
+/// Thresholds of the vector fold. Two replicas must fold with the same ones.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VectorConfig {
+    /// Gate on the squared Mahalanobis distance of two lines: 99 % of chi-square with 2 degrees
+    /// of freedom.
+    pub gate: f64,
+    /// Walls are not perfectly straight: standard deviation added to an offset, metres.
+    pub offset_noise: f64,
+    /// The same for an angle, radians.
+    pub angle_noise: f64,
+    /// However uncertain, looks further apart than this are not one wall, metres.
+    pub offset_max: f64,
+    /// However uncertain, looks turned more than this are not one wall, radians.
+    pub angle_max: f64,
+    /// Two pieces further apart than this along the wall are not joined, metres.
+    pub gap_max: f64,
+    /// Scales that make an offset (metres) and an angle (radians) comparable in a trace.
+    pub trace_scale: [f64; 2],
+    /// Error that all fixes on surveyed landmarks share: standard deviation of a position, metres.
+    pub datum_position_sd: f64,
+    /// The same for a heading, radians.
+    pub datum_heading_sd: f64,
+    /// Cells below this many nats of scanner evidence count as free.
+    pub free_below: f64,
+    /// A wall is seen through where this much of it in a row lies in free cells only, metres.
+    pub seen_through_min: f64,
+    /// Shorter pieces are not published, metres.
+    pub length_min: f64,
+    /// Parts of two walls that are not further apart than this are one wall seen twice, metres.
+    pub duplicate_offset: f64,
+    /// Two clusters are one if their hulls are not further apart than this, metres, plus three
+    /// standard deviations of their places.
+    pub cluster_gap: f64,
+    /// However uncertain, clusters whose hulls are further apart than this are two, metres.
+    pub cluster_gap_max: f64,
+}
+
+impl VectorConfig {
+    /// The defaults (`docs/NOTATION.md` names their sources).
+    pub const STANDARD: Self = Self {
+        gate: 9.21,
+        offset_noise: 0.005,
+        angle_noise: 0.0035,
+        offset_max: 0.25,
+        angle_max: 0.35,
+        gap_max: 0.25,
+        trace_scale: [0.05, 0.035],
+        datum_position_sd: 0.01,
+        datum_heading_sd: 0.001,
+        free_below: -1.0,
+        seen_through_min: 0.15,
+        length_min: 0.2,
+        duplicate_offset: 0.12,
+        cluster_gap: 0.10,
+        cluster_gap_max: 0.30,
+    };
+}

@@ -1,0 +1,199 @@
+//! All clusters of a level: observations in, published clusters out, as a function of the set.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use nalgebra::Matrix2;
+
+use super::leaders::{Groupable, Leaders};
+use super::seen_through::{Evidence, all_free};
+use super::{Cluster, ObservedCluster, VectorConfig};
+use crate::geometry::{Covariance, Point, convex_hull, distance_to_hull};
+use crate::level::{Contribution, FeatureId, RobotName};
+use crate::raster::{Cell, TileIndex};
+
+/// A cluster as one look saw it, in the level frame.
+#[derive(Debug, Clone)]
+struct Sight {
+    hull: Vec<Point>,
+    centroid: Point,
+    covariance: Matrix2<f64>,
+    points: u32,
+    robot: RobotName,
+    observed_at_us: i64,
+}
+
+impl Sight {
+    fn new(cluster: &ObservedCluster, look: &Contribution) -> Self {
+        let pose = &look.level_from_robot.pose;
+        let (s, c) = pose.heading().sin_cos();
+        let rotation = Matrix2::new(c, -s, s, c);
+        let j_pose = pose.j_point_pose(&cluster.centroid);
+        let covariance = cluster.covariance.transformed(&rotation)
+            + look.level_from_robot.covariance.transformed(&j_pose);
+        Self {
+            hull: cluster.hull.iter().map(|p| pose.act(p)).collect(),
+            centroid: pose.act(&cluster.centroid),
+            covariance: *covariance.matrix(),
+            points: cluster.points,
+            robot: look.robot.clone(),
+            observed_at_us: look.observed_at_us,
+        }
+    }
+
+    fn extent(&self) -> (Point, Point) {
+        self.hull
+            .iter()
+            .fold((self.centroid, self.centroid), |(low, high), p| (low.inf(p), high.sup(p)))
+    }
+}
+
+impl Groupable for Sight {
+    type Config = VectorConfig;
+
+    fn reach(&self) -> (Point, Point) {
+        // Half of the largest gap across which two clusters pair.
+        const MARGIN: f64 = 0.15;
+        let (low, high) = self.extent();
+        let margin = Point::new(MARGIN, MARGIN);
+        (low - margin, high + margin)
+    }
+
+    fn merit(&self) -> f64 {
+        f64::from(self.points)
+    }
+
+    /// The distance of the hulls (nearest vertex of either to the other), against the uncertainty
+    /// of their places.
+    fn pairing(&self, follower: &Self, config: &VectorConfig) -> Option<f64> {
+        let to = |hull: &[Point], from: &[Point]| {
+            from.iter().map(|p| distance_to_hull(p, hull)).fold(f64::INFINITY, f64::min)
+        };
+        let gap = to(&self.hull, &follower.hull).min(to(&follower.hull, &self.hull));
+        let variance = (self.covariance + follower.covariance).trace() * 0.5;
+        let allowed = (config.cluster_gap + 3.0 * variance.sqrt()).min(config.cluster_gap_max);
+        (gap <= allowed).then(|| (self.centroid - follower.centroid).norm())
+    }
+}
+
+/// The state of the fold of clusters.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Things {
+    sights: Leaders<Sight>,
+    /// Every cluster, published or not.
+    clusters: BTreeMap<FeatureId, Arc<Cluster>>,
+    by_tile: BTreeMap<TileIndex, BTreeSet<FeatureId>>,
+}
+
+impl Things {
+    /// As [`super::walls::Walls::update`], for clusters.
+    pub(crate) fn update<E: Evidence>(
+        &mut self,
+        inserted: &[&Contribution],
+        removed: &[&Contribution],
+        touched: &BTreeSet<TileIndex>,
+        grid: &E,
+        published: &mut BTreeMap<FeatureId, Arc<Cluster>>,
+        config: &VectorConfig,
+    ) -> BTreeSet<FeatureId> {
+        let id = |look: &Contribution, index| FeatureId { contribution: look.id, index };
+        let sights = inserted.iter().flat_map(|look| {
+            (0_u16..)
+                .zip(&look.clusters)
+                .map(|(i, cluster)| (id(look, i), Sight::new(cluster, look)))
+        });
+        let gone: Vec<FeatureId> = removed
+            .iter()
+            .flat_map(|look| (0_u16..).zip(&look.clusters).map(|(i, _)| id(look, i)))
+            .collect();
+        let mut unpublished = self.sights.update(sights.collect(), &gone, config);
+        for id in &unpublished {
+            self.fuse(*id, grid.resolution());
+        }
+        for tile in touched {
+            unpublished.extend(self.by_tile.get(tile).into_iter().flatten());
+        }
+        let mut changed = BTreeSet::new();
+        for id in unpublished {
+            let cluster = self.clusters.get(&id).filter(|cluster| {
+                let points = cluster.hull.iter().chain([&cluster.centroid]);
+                !all_free(points, grid, config)
+            });
+            if published.get(&id).map(AsRef::as_ref) == cluster.map(AsRef::as_ref) {
+                continue;
+            }
+            match cluster {
+                Some(cluster) => published.insert(id, Arc::clone(cluster)),
+                None => published.remove(&id),
+            };
+            changed.insert(id);
+        }
+        changed
+    }
+
+    /// Makes the cluster of a group anew, or ends it with its group.
+    fn fuse(&mut self, id: FeatureId, resolution: f64) {
+        if let Some(old) = self.clusters.remove(&id) {
+            for tile in tiles_of(&old, resolution) {
+                if let Some(ids) = self.by_tile.get_mut(&tile) {
+                    ids.remove(&id);
+                    if ids.is_empty() {
+                        self.by_tile.remove(&tile);
+                    }
+                }
+            }
+        }
+        let Some(group) = self.sights.group(id) else { return };
+        if let Some(cluster) = fuse_group(group) {
+            for tile in tiles_of(&cluster, resolution) {
+                self.by_tile.entry(tile).or_default().insert(id);
+            }
+            self.clusters.insert(id, Arc::new(cluster));
+        }
+    }
+}
+
+/// The tiles under a hull's corners and centre.
+fn tiles_of(cluster: &Cluster, resolution: f64) -> BTreeSet<TileIndex> {
+    let points = cluster.hull.iter().chain([&cluster.centroid]);
+    points.map(|p| Cell::holding(p, resolution).tile().0).collect()
+}
+
+/// Hull of all hulls, centroid averaged by points. Looks at one thing see different sides of it, and
+/// their pose errors may be shared: the covariance is that of the best look, it does not shrink.
+fn fuse_group<'a>(group: impl Iterator<Item = (FeatureId, &'a Sight)>) -> Option<Cluster> {
+    let mut corners = Vec::new();
+    let mut sum = Point::zeros();
+    let mut points: u64 = 0;
+    let mut least: Option<Matrix2<f64>> = None;
+    let mut robots = Vec::new();
+    let (mut looks, mut last_look) = (0, None);
+    let (mut first_seen_us, mut last_seen_us) = (i64::MAX, i64::MIN);
+    for (id, sight) in group {
+        corners.extend_from_slice(&sight.hull);
+        sum += sight.centroid * f64::from(sight.points);
+        points += u64::from(sight.points);
+        if least.is_none_or(|c| sight.covariance.trace() < c.trace()) {
+            least = Some(sight.covariance);
+        }
+        if last_look != Some(id.contribution) {
+            looks += 1;
+            last_look = Some(id.contribution);
+        }
+        robots.push(sight.robot.clone());
+        first_seen_us = first_seen_us.min(sight.observed_at_us);
+        last_seen_us = last_seen_us.max(sight.observed_at_us);
+    }
+    robots.sort_unstable();
+    robots.dedup();
+    Some(Cluster {
+        hull: convex_hull(&corners),
+        centroid: sum / points as f64,
+        covariance: Covariance::symmetrised(least?),
+        points,
+        looks,
+        robots,
+        first_seen_us,
+        last_seen_us,
+    })
+}

@@ -1,0 +1,145 @@
+//! One wall: the fused line of a group and the parts of it that were seen.
+
+use super::fusion::{FusedLine, fuse};
+use super::sighting::Sighting;
+use super::{EndKind, Facing, VectorConfig};
+use crate::geometry::{
+    Covariance, Interval, Level, Line, Point, UncertainLine, tangent, union_intervals, unit_normal,
+};
+use crate::level::{FeatureId, RobotName};
+
+/// A wall before the grid and its neighbours have had their say about which parts are published.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Wall {
+    pub(super) line: Line<Level>,
+    pub(super) independent: Covariance<2>,
+    pub(super) dependent: Covariance<2>,
+    pub(super) facing: Facing,
+    /// What was seen of it, ascending, disjoint, millimetres along `line`.
+    pub(super) seen: Vec<Interval>,
+    /// Where looks ended, and how: millimetres along `line`.
+    ends: Vec<(i64, EndKind)>,
+    pub(super) looks: u32,
+    pub(super) robots: Vec<RobotName>,
+    pub(super) first_seen_us: i64,
+    pub(super) last_seen_us: i64,
+}
+
+/// Pieces that are not further apart than this count as one, millimetres.
+const BRIDGE_MM: i64 = 150;
+/// An end of a look counts for an end of the wall if it is not further from it, millimetres.
+const END_MM: i64 = 150;
+
+impl Wall {
+    /// Fuses a group (canonical order) that `leader` leads. `None` if it carries no information.
+    pub(super) fn new<'a>(
+        group: impl Iterator<Item = (FeatureId, &'a Sighting)> + Clone,
+        leader: &Sighting,
+        config: &VectorConfig,
+    ) -> Option<Self> {
+        let fused = fuse(group.clone(), leader, config)?;
+        let (line, independent, dependent, facing) = in_level_frame(&fused);
+        let mut seen = Vec::new();
+        let mut ends = Vec::new();
+        let mut robots = Vec::new();
+        let mut last_look = None;
+        let (mut looks, mut first_seen_us, mut last_seen_us) = (0, i64::MAX, i64::MIN);
+        for (id, sighting) in group {
+            let [a, b] = sighting.end_points().map(|p| line.along(&p));
+            seen.push(Interval::from_metres(a, b));
+            ends.push(((a * 1e3).round() as i64, sighting.ends[0].kind));
+            ends.push(((b * 1e3).round() as i64, sighting.ends[1].kind));
+            if last_look != Some(id.contribution) {
+                looks += 1;
+                last_look = Some(id.contribution);
+            }
+            robots.push(sighting.robot.clone());
+            first_seen_us = first_seen_us.min(sighting.observed_at_us);
+            last_seen_us = last_seen_us.max(sighting.observed_at_us);
+        }
+        robots.sort_unstable();
+        robots.dedup();
+        ends.sort_unstable();
+        let seen = union_intervals(&seen, BRIDGE_MM);
+        Some(Self {
+            line,
+            independent,
+            dependent,
+            facing,
+            seen,
+            ends,
+            looks,
+            robots,
+            first_seen_us,
+            last_seen_us,
+        })
+    }
+
+    /// Lower left and upper right corner of what was seen.
+    pub(super) fn extent(&self) -> (Point, Point) {
+        let first = self.seen.first().map_or(0.0, Interval::from_m);
+        let last = self.seen.last().map_or(0.0, Interval::to_m);
+        let (a, b) = (self.line.at(first), self.line.at(last));
+        (a.inf(&b), a.sup(&b))
+    }
+
+    /// The direction in which free space lies.
+    pub(super) fn towards_free(&self) -> Point {
+        let n = unit_normal(self.line.alpha());
+        match self.facing {
+            Facing::Origin => -n,
+            Facing::Away => n,
+        }
+    }
+
+    /// What is known of the wall's end at `at` millimetres: a corner rather than a physical end rather
+    /// than the end of a view.
+    pub(super) fn end_kind(&self, at: i64) -> Option<EndKind> {
+        let from = self.ends.partition_point(|(end, _)| *end < at - END_MM);
+        self.ends[from..].iter().take_while(|(end, _)| *end <= at + END_MM).map(|(_, k)| *k).min()
+    }
+
+    /// The parts of this wall, among `pieces`, that run along `other` not further than
+    /// `config.duplicate_offset` from it and that face the same side: one wall seen twice.
+    pub(super) fn duplicated(
+        &self,
+        pieces: &[Interval],
+        other: &Self,
+        other_pieces: impl Iterator<Item = Interval>,
+        config: &VectorConfig,
+    ) -> Vec<Interval> {
+        if self.towards_free().dot(&other.towards_free()) < config.angle_max.cos() {
+            return Vec::new();
+        }
+        let across = |t: f64| other.line.across(&self.line.at(t)).abs() <= config.duplicate_offset;
+        let mut shared = Vec::new();
+        for theirs in other_pieces {
+            let [a, b] =
+                [theirs.from_m(), theirs.to_m()].map(|t| self.line.along(&other.line.at(t)));
+            let theirs = Interval::from_metres(a, b);
+            for own in pieces {
+                let both = Interval { from: own.from.max(theirs.from), to: own.to.min(theirs.to) };
+                if both.length() > 0 && across(both.from_m()) && across(both.to_m()) {
+                    shared.push(both);
+                }
+            }
+        }
+        union_intervals(&shared, 0)
+    }
+}
+
+/// A fused line in normal form about the level's origin. Its normal points to free space; in normal
+/// form it points away from the origin, which decides the facing.
+fn in_level_frame(fused: &FusedLine) -> (Line<Level>, Covariance<2>, Covariance<2>, Facing) {
+    let n = unit_normal(fused.alpha);
+    let rho = fused.offset + n.dot(&fused.anchor);
+    let lever = tangent(fused.alpha).dot(&fused.anchor);
+    let about_origin =
+        |c: &nalgebra::Matrix2<f64>| Covariance::symmetrised(super::sighting::about(c, lever));
+    let (independent, turned) =
+        UncertainLine::<Level>::normal_form(rho, fused.alpha, about_origin(&fused.independent));
+    let (dependent, _) =
+        UncertainLine::<Level>::normal_form(rho, fused.alpha, about_origin(&fused.dependent));
+    let facing = if turned { Facing::Origin } else { Facing::Away };
+    (independent.line, independent.covariance, dependent.covariance, facing)
+}

@@ -1,0 +1,7 @@
+//! The fold as a function of the set: order, batches, removal and restoring do not matter.
+#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+mod honesty;
+mod set_function;
+mod walls;
+mod world;

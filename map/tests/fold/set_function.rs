@@ -1,0 +1,105 @@
+//! Any order, any batches, any detour through removals, and restoring: the same bits.
+
+use mapfold_map::level::{Contribution, Level, LevelConfig, LevelMap, apply, diff};
+use proptest::prelude::*;
+
+use crate::world::{Chance, NOISE, looks};
+
+fn folded<'a>(looks: impl IntoIterator<Item = &'a Contribution>) -> Level {
+    let mut level = Level::new(LevelConfig::standard(0.05));
+    level.fold(looks);
+    level
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn any_order_and_any_batches_give_the_same_bits(seed: u64, batch in 1_usize..9) {
+        let looks = looks(seed, 40, NOISE);
+        let at_once = folded(&looks);
+        prop_assert!(at_once.map().segments.len() >= 4);
+        prop_assert!(!at_once.map().clusters.is_empty());
+        prop_assert!(!at_once.map().tiles.is_empty());
+        let mut one_by_one = Level::new(LevelConfig::standard(0.05));
+        let shuffled = Chance(seed).shuffled(looks.clone());
+        for some in shuffled.chunks(batch) {
+            one_by_one.fold(some);
+        }
+        prop_assert_eq!(one_by_one.map(), at_once.map());
+    }
+
+    #[test]
+    fn what_is_taken_out_was_never_there(seed: u64, out in 1_u64..39) {
+        let all = looks(seed, 40, NOISE);
+        let mut chance = Chance(seed ^ 1);
+        let (removed, kept): (Vec<_>, Vec<_>) =
+            all.iter().cloned().partition(|_| chance.bits() % 40 < out);
+        let mut level = folded(&chance.shuffled(all.clone()));
+        for some in chance.shuffled(removed.clone()).chunks(3) {
+            level.unfold(some);
+        }
+        let never = folded(&kept);
+        prop_assert_eq!(level.map(), never.map());
+        level.fold(&removed);
+        let back = folded(&all);
+        prop_assert_eq!(level.map(), back.map());
+    }
+
+    #[test]
+    fn restoring_and_going_on_is_the_same_as_folding(seed: u64, stored in 0_usize..40) {
+        let looks = looks(seed, 40, NOISE);
+        let before = folded(&looks[..stored]);
+        let tiles = before.map().tiles.iter().map(|(key, tile)| (*key, tile.as_ref().clone()));
+        let bare: Vec<Contribution> = looks[..stored]
+            .iter()
+            .map(|c| Contribution { evidence: Vec::new(), ..c.clone() })
+            .collect();
+        let mut restored = Level::restore(LevelConfig::standard(0.05), tiles, &bare);
+        prop_assert_eq!(restored.map(), before.map());
+        restored.fold(&looks[stored..]);
+        let at_once = folded(&looks);
+        prop_assert_eq!(restored.map(), at_once.map());
+    }
+
+    #[test]
+    fn patches_lead_from_any_state_to_any_other(seed: u64, a in 0_usize..40, b in 0_usize..40) {
+        let looks = looks(seed, 40, NOISE);
+        let (from, to) = (folded(&looks[..a]), folded(&looks[..b]));
+        let mut map: LevelMap = from.map().clone();
+        apply(&diff(from.map(), to.map()), &mut map);
+        prop_assert_eq!(&map, to.map());
+        prop_assert!(diff(to.map(), &map).is_empty());
+    }
+
+    #[test]
+    fn changes_name_exactly_what_changed(seed: u64, stored in 0_usize..39) {
+        let looks = looks(seed, 40, NOISE);
+        let mut level = folded(&looks[..stored]);
+        let before = level.map().clone();
+        let changes = level.fold(&looks[stored..=stored]);
+        let patch = diff(&before, level.map());
+        let changed: Vec<_> = patch.segments.keys().chain(&patch.removed_segments).copied().collect();
+        for id in &changed {
+            prop_assert!(changes.segments.contains(id));
+        }
+        let changed: Vec<_> = patch.clusters.keys().chain(&patch.removed_clusters).copied().collect();
+        for id in &changed {
+            prop_assert!(changes.clusters.contains(id));
+        }
+        let changed: Vec<_> = patch.tiles.keys().chain(&patch.removed_tiles).copied().collect();
+        for key in &changed {
+            prop_assert!(changes.tiles.contains(key));
+        }
+    }
+}
+
+#[test]
+fn folding_the_same_contribution_twice_changes_nothing() {
+    let looks = looks(7, 10, NOISE);
+    let mut level = folded(&looks);
+    let before = level.map().clone();
+    let changes = level.fold(&looks);
+    assert_eq!(level.map(), &before);
+    assert!(changes.segments.is_empty() && changes.clusters.is_empty() && changes.tiles.is_empty());
+}

@@ -1,0 +1,169 @@
+//! What the fold makes of walls, doors and things.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use mapfold_map::geometry::{Covariance, Point, Pose, UncertainPose};
+use mapfold_map::level::{Contribution, Level, LevelConfig, Provenance};
+use mapfold_map::raster::{Cell, EvidencePatch, SensorClass, TILE_CELLS, TilePatch};
+use mapfold_map::vector::Segment;
+
+use crate::world::{Chance, NOISE, Noise, id, looks, observe};
+
+const EXACT: Noise = Noise { position: 0.005, heading: 0.001, offset: 0.002, angle: 0.001 };
+
+fn look(number: u64, walls: &[(Point, Point)], from: Point, noise: Noise) -> Contribution {
+    let mut chance = Chance(number + 1000);
+    let truth = Pose::new(from.x, from.y, chance.uniform(-3.0, 3.0));
+    Contribution {
+        id: id(1, number),
+        robot: Arc::from("ada"),
+        observed_at_us: number as i64,
+        level_from_robot: UncertainPose {
+            pose: truth,
+            covariance: Covariance::from_variances([
+                noise.position.powi(2),
+                noise.position.powi(2),
+                noise.heading.powi(2),
+            ]),
+        },
+        provenance: Provenance::SharedMap,
+        segments: walls.iter().map(|(a, b)| observe(*a, *b, &truth, noise, &mut chance)).collect(),
+        clusters: Vec::new(),
+        evidence: Vec::new(),
+    }
+}
+
+fn folded(looks: &[Contribution]) -> Level {
+    let mut level = Level::new(LevelConfig::standard(0.05));
+    level.fold(looks);
+    level
+}
+
+fn only(level: &Level) -> &Segment {
+    assert_eq!(level.map().segments.len(), 1, "{:#?}", level.map().segments);
+    level.map().segments.values().next().unwrap()
+}
+
+#[test]
+fn looks_at_one_wall_become_one_segment_that_counts_them() {
+    let wall = (Point::new(30.0, 12.0), Point::new(34.0, 15.0));
+    let looks: Vec<_> = (0..9).map(|i| look(i, &[wall], Point::new(33.0, 10.0), EXACT)).collect();
+    let level = folded(&looks);
+    let segment = only(&level);
+    assert_eq!(segment.looks, 9);
+    assert_eq!(segment.solid.len(), 1);
+    assert!((segment.solid[0].span.length() - 5000).abs() < 30);
+    for end in [wall.0, wall.1] {
+        assert!(segment.line.across(&end).abs() < 0.01);
+    }
+}
+
+#[test]
+fn opposite_faces_of_a_thin_wall_stay_two() {
+    let front = (Point::new(1.0, 3.0), Point::new(5.0, 3.0));
+    let back = (Point::new(1.0, 3.08), Point::new(5.0, 3.08));
+    let level = folded(&[
+        look(0, &[front], Point::new(3.0, 1.0), EXACT),
+        look(1, &[(back.1, back.0)], Point::new(3.0, 5.0), EXACT),
+    ]);
+    assert_eq!(level.map().segments.len(), 2);
+}
+
+#[test]
+fn a_wall_through_the_origin_of_the_level_is_one_wall() {
+    let wall = (Point::new(-2.0, 0.001), Point::new(2.0, -0.001));
+    let looks: Vec<_> = (0..6).map(|i| look(i, &[wall], Point::new(0.3, 2.0), EXACT)).collect();
+    assert_eq!(only(&folded(&looks)).looks, 6);
+}
+
+/// Free evidence in all cells of a strip across the wall y = 3, from x0 to x1.
+fn strip(number: u64, x0: f64, x1: f64, class: SensorClass) -> Contribution {
+    let mut cells: BTreeMap<_, Box<[i16; TILE_CELLS]>> = BTreeMap::new();
+    let (mut x, step) = (x0 + 0.025, 0.05);
+    while x < x1 {
+        for row in 0..20 {
+            let p = Point::new(x, 2.5 + 0.025 + 0.05 * f64::from(row));
+            let (tile, offset) = Cell::holding(&p, 0.05).tile();
+            cells.entry(tile).or_insert_with(|| Box::new([0; TILE_CELLS]))[offset] = -200;
+        }
+        x += step;
+    }
+    let tiles = cells.into_iter().map(|(t, c)| (t, TilePatch::from_cells(&c))).collect();
+    Contribution {
+        segments: Vec::new(),
+        evidence: vec![EvidencePatch { class, tiles }],
+        ..look(number, &[], Point::new(3.0, 1.0), EXACT)
+    }
+}
+
+#[test]
+fn a_doorway_that_robots_look_through_is_open_and_closes_when_the_evidence_is_taken_out() {
+    let wall = (Point::new(1.0, 3.0), Point::new(5.0, 3.0));
+    let looks =
+        [look(0, &[wall], Point::new(3.0, 1.0), EXACT), strip(1, 2.0, 2.9, SensorClass::Scanner)];
+    let mut level = folded(&looks);
+    let segment = only(&level).clone();
+    assert_eq!(segment.solid.len(), 2);
+    let gap = segment.solid[1].span.from - segment.solid[0].span.to;
+    assert!((gap - 900).abs() <= 100, "the gap is {gap} mm");
+    level.unfold(&looks[1..]);
+    assert_eq!(only(&level).solid.len(), 1);
+}
+
+#[test]
+fn sonar_alone_opens_no_wall() {
+    let wall = (Point::new(1.0, 3.0), Point::new(5.0, 3.0));
+    let level = folded(&[
+        look(0, &[wall], Point::new(3.0, 1.0), EXACT),
+        strip(1, 2.0, 2.9, SensorClass::Sonar),
+    ]);
+    assert_eq!(only(&level).solid.len(), 1);
+}
+
+#[test]
+fn two_walls_with_a_door_between_them_are_not_bridged() {
+    let walls = [
+        (Point::new(1.0, 3.0), Point::new(3.0, 3.0)),
+        (Point::new(3.9, 3.0), Point::new(6.0, 3.0)),
+    ];
+    let looks: Vec<_> = (0..5).map(|i| look(i, &walls, Point::new(3.4, 1.0), EXACT)).collect();
+    let level = folded(&looks);
+    let lengths: Vec<i64> = level
+        .map()
+        .segments
+        .values()
+        .flat_map(|s| s.solid.iter().map(|i| i.span.length()))
+        .collect();
+    assert_eq!(lengths.len(), 2);
+    assert!(lengths.iter().all(|l| *l < 2200));
+}
+
+#[test]
+fn a_room_seen_from_inside_by_many_has_four_walls() {
+    let level = folded(&looks(3, 60, NOISE));
+    let long = level
+        .map()
+        .segments
+        .values()
+        .filter(|s| s.solid.iter().any(|i| i.span.length() > 3000))
+        .count();
+    assert_eq!(long, 8, "two rooms of four walls");
+    // The wall between the rooms is 12 cm thick and seen from both sides.
+    assert!(level.map().segments.len() <= 12, "{} segments", level.map().segments.len());
+}
+
+#[test]
+fn a_long_wall_seen_piece_by_piece_is_not_published_twice() {
+    let looks: Vec<_> = (0..20)
+        .map(|i| {
+            let x = i as f64;
+            let wall = (Point::new(x, 3.0), Point::new(x + 4.0, 3.0));
+            look(i, &[wall], Point::new(x + 2.0, 1.0), EXACT)
+        })
+        .collect();
+    let level = folded(&looks);
+    let total: i64 =
+        level.map().segments.values().flat_map(|s| s.solid.iter().map(|i| i.span.length())).sum();
+    assert!((total - 23_000).abs() < 300, "{total} mm of a wall of 23 m");
+}
