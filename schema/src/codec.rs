@@ -14,6 +14,9 @@ pub const JSON: &str = "application/json";
 /// Media type of CBOR.
 pub const CBOR: &str = "application/cbor";
 
+/// Longest piece of a body that an error repeats, bytes.
+const ECHO_LENGTH_MAX: usize = 512;
+
 /// A body that is not what it should be.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeError {
@@ -190,8 +193,14 @@ fn shape(path: &serde_path_to_error::Path, error: &impl ToString) -> DecodeError
         pointer.push_str(&step);
     }
     DecodeError::Shape(Violation {
-        pointer,
+        pointer: shortened(pointer),
         code: "unexpected_shape".to_owned(),
-        detail: error.to_string(),
+        detail: shortened(error.to_string()),
     })
+}
+
+/// At most [`ECHO_LENGTH_MAX`] bytes: errors quote the body, and the body may be megabytes.
+fn shortened(mut text: String) -> String {
+    text.truncate(text.floor_char_boundary(ECHO_LENGTH_MAX));
+    text
 }

@@ -20,7 +20,7 @@ pub struct Problem {
     pub status: u16,
     /// What happened here and what to do about it.
     pub detail: String,
-    /// The kind as a stable snake_case name.
+    /// The kind as a stable `snake_case` name.
     pub code: String,
     /// What is wrong with the body, place by place.
     #[serde(default)]

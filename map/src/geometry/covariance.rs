@@ -31,6 +31,14 @@ const SYMMETRY_TOLERANCE: f64 = 1e-9;
 /// Negative pivot, relative to the largest variance, up to which it counts as rounding.
 const PIVOT_TOLERANCE: f64 = 1e-10;
 
+/// How far an eigenvalue may lie below the floor and count as on it, so that flooring twice is
+/// flooring once.
+const FLOOR_TOLERANCE: f64 = 1e-9;
+/// Error of a computed eigenvalue relative to the largest one, with a wide margin.
+const ROUNDING_TOLERANCE: f64 = 1e-12;
+/// Sweeps of Jacobi's method; it converges quadratically, a 3 by 3 matrix in about five.
+const JACOBI_SWEEPS_MAX: usize = 16;
+
 /// A covariance: symmetric by construction, positive semi-definite by check.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Covariance<const N: usize>(SMatrix<f64, N, N>);
@@ -51,18 +59,14 @@ impl<const N: usize> Covariance<N> {
         for row in 0..N {
             for column in 0..row {
                 let (a, b) = (matrix[(row, column)], matrix[(column, row)]);
-                let scale = (matrix[(row, row)].abs() * matrix[(column, column)].abs()).sqrt();
+                let scale = matrix[(row, row)].abs().sqrt() * matrix[(column, column)].abs().sqrt();
                 if (a - b).abs() > SYMMETRY_TOLERANCE * scale.max(a.abs()).max(b.abs()) {
                     return Err(CovarianceError::NotSymmetric { row, column });
                 }
             }
         }
         let symmetric = Self::symmetrised(matrix);
-        if symmetric.is_positive() {
-            Ok(symmetric)
-        } else {
-            Err(CovarianceError::NotPositive)
-        }
+        if symmetric.is_positive() { Ok(symmetric) } else { Err(CovarianceError::NotPositive) }
     }
 
     /// Checks rows from outside, like [`Self::new`].
@@ -114,6 +118,26 @@ impl<const N: usize> Covariance<N> {
         Self(self.0 * factor)
     }
 
+    /// The same uncertainty, but in no direction less than that of independent components with the
+    /// standard deviations `sds` (all positive): in units of these, every eigenvalue is raised to
+    /// 1 at least. A covariance that reaches that already comes back bit for bit.
+    #[must_use]
+    pub fn floored(&self, sds: &[f64; N]) -> Self {
+        debug_assert!(sds.iter().all(|sd| sd.is_finite() && *sd > 0.0));
+        let scaled = SMatrix::<f64, N, N>::from_fn(|i, j| self.0[(i, j)] / (sds[i] * sds[j]));
+        let (values, vectors) = symmetric_eigen(scaled);
+        let tolerance = FLOOR_TOLERANCE + ROUNDING_TOLERANCE * values.amax();
+        if values.iter().all(|v| *v >= 1.0 - tolerance) {
+            return *self;
+        }
+        if values.iter().all(|v| *v <= 1.0) {
+            return Self::from_variances(sds.map(|sd| sd * sd));
+        }
+        let raised = vectors * SMatrix::<f64, N, N>::from_diagonal(&values.map(|v| v.max(1.0)));
+        let floored = raised * vectors.transpose();
+        Self::symmetrised(SMatrix::from_fn(|i, j| floored[(i, j)] * (sds[i] * sds[j])))
+    }
+
     /// The standard deviation of component `index`.
     pub fn sd(&self, index: usize) -> f64 {
         self.0[(index, index)].max(0.0).sqrt()
@@ -143,7 +167,9 @@ impl<const N: usize> Covariance<N> {
             }
             let Some(p) = pivot else { break };
             let d = a[(p, p)];
-            if d < -tolerance {
+            // Said so that NaN, which overflow can lead to, is refused too.
+            let in_range = d >= -tolerance && d.is_finite();
+            if !in_range {
                 return false;
             }
             done[p] = true;
@@ -174,11 +200,52 @@ impl<const N: usize> std::ops::Add for Covariance<N> {
     }
 }
 
+/// Eigenvalues and eigenvectors (as columns) of a symmetric matrix by Jacobi's cyclic rotations
+/// (Golub & Van Loan 2013, algorithm 8.5.2). It uses only operations that every processor rounds
+/// alike, so the result is the same everywhere.
+fn symmetric_eigen<const N: usize>(
+    mut a: SMatrix<f64, N, N>,
+) -> (SVector<f64, N>, SMatrix<f64, N, N>) {
+    let mut vectors = SMatrix::<f64, N, N>::identity();
+    for _ in 0..JACOBI_SWEEPS_MAX {
+        let mut turned = false;
+        for p in 0..N {
+            for q in p + 1..N {
+                let scale = a[(p, p)].abs().max(a[(q, q)].abs());
+                if a[(p, q)].abs() <= f64::EPSILON * f64::EPSILON * scale {
+                    continue;
+                }
+                turned = true;
+                let tau = (a[(q, q)] - a[(p, p)]) / (2.0 * a[(p, q)]);
+                let t = tau.signum() / (tau.abs() + (1.0 + tau * tau).sqrt());
+                let c = 1.0 / (1.0 + t * t).sqrt();
+                let s = t * c;
+                for k in 0..N {
+                    let (kp, kq) = (a[(k, p)], a[(k, q)]);
+                    a[(k, p)] = c * kp - s * kq;
+                    a[(k, q)] = s * kp + c * kq;
+                }
+                for k in 0..N {
+                    let (pk, qk) = (a[(p, k)], a[(q, k)]);
+                    a[(p, k)] = c * pk - s * qk;
+                    a[(q, k)] = s * pk + c * qk;
+                }
+                for k in 0..N {
+                    let (kp, kq) = (vectors[(k, p)], vectors[(k, q)]);
+                    vectors[(k, p)] = c * kp - s * kq;
+                    vectors[(k, q)] = s * kp + c * kq;
+                }
+            }
+        }
+        if !turned {
+            break;
+        }
+    }
+    (a.diagonal(), vectors)
+}
+
 /// Squared Mahalanobis distance `delta^T C^-1 delta`; infinite where `C` is singular.
-pub fn mahalanobis_sq<const N: usize>(
-    delta: &SVector<f64, N>,
-    covariance: &Covariance<N>,
-) -> f64 {
+pub fn mahalanobis_sq<const N: usize>(delta: &SVector<f64, N>, covariance: &Covariance<N>) -> f64 {
     nalgebra::Cholesky::new(covariance.0)
         .map_or(f64::INFINITY, |c| (delta.transpose() * c.solve(delta))[(0, 0)])
 }

@@ -41,7 +41,8 @@ pub fn distance_to_hull(p: &Point, hull: &[Point]) -> f64 {
         let b = hull[(i + 1) % hull.len()];
         let edge = b - a;
         let length_sq = edge.norm_squared();
-        let t = if length_sq > 0.0 { ((p - a).dot(&edge) / length_sq).clamp(0.0, 1.0) } else { 0.0 };
+        let t =
+            if length_sq > 0.0 { ((p - a).dot(&edge) / length_sq).clamp(0.0, 1.0) } else { 0.0 };
         nearest = nearest.min((p - (a + edge * t)).norm());
         inside &= edge.perp(&(p - a)) >= 0.0;
     }

@@ -65,8 +65,12 @@ impl<A: Copy, B: Copy> Pose<A, B> {
     pub fn j_point_pose(&self, p: &Point) -> Matrix2x3<f64> {
         let (s, c) = self.heading.sin_cos();
         Matrix2x3::new(
-            1.0, 0.0, -s * p.x - c * p.y, //
-            0.0, 1.0, c * p.x - s * p.y,
+            1.0,
+            0.0,
+            -s * p.x - c * p.y, //
+            0.0,
+            1.0,
+            c * p.x - s * p.y,
         )
     }
 
@@ -75,9 +79,15 @@ impl<A: Copy, B: Copy> Pose<A, B> {
         let (s, c) = self.heading.sin_cos();
         let j = self.j_point_pose(&b_from_c.position());
         let j_ac_ab = Matrix3::new(
-            1.0, 0.0, j[(0, 2)], //
-            0.0, 1.0, j[(1, 2)], //
-            0.0, 0.0, 1.0,
+            1.0,
+            0.0,
+            j[(0, 2)], //
+            0.0,
+            1.0,
+            j[(1, 2)], //
+            0.0,
+            0.0,
+            1.0,
         );
         let j_ac_bc = Matrix3::new(
             c, -s, 0.0, //
@@ -91,9 +101,15 @@ impl<A: Copy, B: Copy> Pose<A, B> {
     pub fn j_inverse(&self) -> Matrix3<f64> {
         let (s, c) = self.heading.sin_cos();
         Matrix3::new(
-            -c, -s, s * self.x - c * self.y, //
-            s, -c, c * self.x + s * self.y, //
-            0.0, 0.0, -1.0,
+            -c,
+            -s,
+            s * self.x - c * self.y, //
+            s,
+            -c,
+            c * self.x + s * self.y, //
+            0.0,
+            0.0,
+            -1.0,
         )
     }
 

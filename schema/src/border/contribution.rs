@@ -1,13 +1,26 @@
 //! Contributions, between the wire and the map's types.
 
-use mapfold_map::level::Contribution;
+mod cluster;
+mod evidence;
+mod pose;
+mod segment;
+
+use mapfold_map::level::{Contribution, ContributionId};
 use mapfold_map::raster;
 use mapfold_map::vector::{ObservedCluster, ObservedEnd, ObservedSegment};
-use uuid::Uuid;
+use uuid::{Uuid, Variant};
 
-use super::{Target, Violation};
+use super::Target;
+use super::number::read_instant;
+use super::violations::{Place, Violation, Violations};
 use crate::instant::to_rfc3339;
+use crate::slug::is_slug;
 use crate::v1;
+
+/// The first microsecond of 2200.
+const OBSERVED_BEFORE_US: i64 = 7_258_118_400_000_000;
+/// Segments or clusters whose places fit the index of a feature's identity.
+const FEATURES_MAX: usize = 1 << 16;
 
 /// A contribution for the wire: what the map's type does not know is the level's `frame` and
 /// whether the readings were `emulated`.
@@ -81,12 +94,119 @@ fn wire_evidence(evidence: &raster::EvidencePatch) -> v1::EvidencePatch {
 
 /// Checks a contribution against `target` and turns it into the map's own type.
 ///
+/// What is only unusual is normalised, not refused: angles up to a full turn either way are
+/// wrapped to (-pi, pi], -0 and subnormal numbers become 0, and covariances are floored, so that
+/// no robot buys authority with a tiny one: a pose is uncertain by 5 mm and 0.05 degrees at least,
+/// a line by 1 mm and 0.02 degrees, an end and a centroid by 1 mm. The log keeps what was sent.
+///
 /// # Errors
 /// Everything that is wrong with it (at most 32 violations), each with the JSON pointer of its place.
 pub fn check_contribution(
     contribution: &v1::Contribution,
     target: &Target,
 ) -> Result<Contribution, Vec<Violation>> {
-    let _ = (contribution, target);
-    Err(Vec::new())
+    let limits = &target.limits;
+    let root = Place::Root;
+    let mut wrong = Violations::default();
+    check_identity(contribution, target, &mut wrong);
+    let observed_at =
+        check_observed_at(&contribution.observed_at, &root.field("observed_at"), &mut wrong);
+    let level_from_robot = pose::check(&contribution.pose, limits, &root.field("pose"), &mut wrong);
+    let pose = level_from_robot.as_ref().map(|p| &p.pose);
+    let segments = check_all(
+        &contribution.segments,
+        limits.segments_max,
+        "segments",
+        &mut wrong,
+        |segment, place, wrong| segment::check(segment, pose, limits, place, wrong),
+    );
+    let clusters = check_all(
+        &contribution.clusters,
+        limits.clusters_max,
+        "clusters",
+        &mut wrong,
+        |cluster, place, wrong| cluster::check(cluster, pose, limits, place, wrong),
+    );
+    let evidence =
+        evidence::check(&contribution.evidence, target, &root.field("evidence"), &mut wrong);
+    let assembled = || {
+        Some(Contribution {
+            id: ContributionId(contribution.id.into_bytes()),
+            robot: contribution.robot.as_str().into(),
+            observed_at_us: observed_at?,
+            level_from_robot: level_from_robot?,
+            provenance: contribution.pose.provenance.into(),
+            segments: segments?,
+            clusters: clusters?,
+            evidence: evidence?,
+        })
+    };
+    let assembled = assembled();
+    wrong.none_or(assembled)
+}
+
+fn check_identity(contribution: &v1::Contribution, target: &Target, wrong: &mut Violations) {
+    let root = Place::Root;
+    let id = contribution.id;
+    if id.get_version_num() != 7 || id.get_variant() != Variant::RFC4122 {
+        wrong.add(&root.field("id"), "not_uuid_v7", "the id must be a UUID of version 7");
+    }
+    if !is_slug(&contribution.robot) {
+        wrong.add(
+            &root.field("robot"),
+            "bad_slug",
+            "a robot's name is 1 to 64 lower-case letters, digits and inner hyphens",
+        );
+    }
+    if contribution.frame != target.frame {
+        wrong.add(
+            &root.field("frame"),
+            "frame_mismatch",
+            format_args!(
+                "the frame of this level is {}: the pose and the evidence must be in it",
+                target.frame
+            ),
+        );
+    }
+}
+
+/// When it was seen: an instant from 1970 on and before 2200, which keeps every sum of instants
+/// and every text form of one in range.
+fn check_observed_at(text: &str, place: &Place<'_>, wrong: &mut Violations) -> Option<i64> {
+    let instant = read_instant(text, place, wrong)?;
+    if (0..OBSERVED_BEFORE_US).contains(&instant) {
+        return Some(instant);
+    }
+    wrong.add(place, "out_of_range", "this must lie from 1970 on and before 2200: check the clock");
+    None
+}
+
+/// Checks the members of the array `name`, unless there are too many of them.
+fn check_all<W, V>(
+    all: &[W],
+    max: usize,
+    name: &'static str,
+    wrong: &mut Violations,
+    check: impl Fn(&W, &Place<'_>, &mut Violations) -> Option<V>,
+) -> Option<Vec<V>> {
+    let root = Place::Root;
+    let place = root.field(name);
+    let max = max.min(FEATURES_MAX);
+    if all.len() > max {
+        let n = all.len();
+        wrong.add(
+            &place,
+            &format!("too_many_{name}"),
+            format_args!("{n} {name}: one look has at most {max}"),
+        );
+        return None;
+    }
+    let mut checked = Vec::with_capacity(all.len());
+    for (i, one) in all.iter().enumerate() {
+        if wrong.is_full() {
+            return None;
+        }
+        checked.extend(check(one, &place.index(i), wrong));
+    }
+    Some(checked)
 }

@@ -9,9 +9,9 @@ use mapfold_map::raster::{TILE_CELLS, Tile, TileIndex, TileKey};
 use mapfold_map::vector::{Cluster, Segment, SolidInterval};
 use uuid::Uuid;
 
-use super::number::{covariance, finite};
+use super::number::{covariance, finite, read_instant};
 use super::violations::{Place, Violation, Violations};
-use crate::instant::{parse_rfc3339, to_rfc3339};
+use crate::instant::to_rfc3339;
 use crate::slug::is_slug;
 use crate::v1;
 
@@ -319,11 +319,7 @@ fn read_cluster(
 }
 
 /// A point in metres, as two finite numbers.
-pub(super) fn read_point(
-    [x, y]: [f64; 2],
-    place: &Place<'_>,
-    wrong: &mut Violations,
-) -> Option<Point> {
+fn read_point([x, y]: [f64; 2], place: &Place<'_>, wrong: &mut Violations) -> Option<Point> {
     let x = finite(x, &place.index(0), wrong);
     let y = finite(y, &place.index(1), wrong);
     Some(Point::new(x?, y?))
@@ -403,17 +399,4 @@ fn read_seen(
         first_us: first?,
         last_us: last?,
     })
-}
-
-/// An instant in microseconds since 1970.
-pub(super) fn read_instant(text: &str, place: &Place<'_>, wrong: &mut Violations) -> Option<i64> {
-    let instant = parse_rfc3339(text);
-    if instant.is_none() {
-        wrong.add(
-            place,
-            "bad_instant",
-            "this must be an instant as in 2026-11-22T04:00:00.123456Z",
-        );
-    }
-    instant
 }

@@ -13,7 +13,7 @@ pub const VIOLATIONS_MAX: usize = 32;
 pub struct Violation {
     /// JSON pointer (RFC 6901) of the place.
     pub pointer: String,
-    /// Stable name of the fault, snake_case.
+    /// Stable name of the fault, `snake_case`.
     pub code: String,
     /// What is wrong and what would be right, for a person.
     pub detail: String,
