@@ -6,7 +6,7 @@ use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_mai
 use mapfold_map::level::{Contribution, Level, LevelConfig};
 
 #[path = "../tests/fold/world.rs"]
-#[expect(dead_code, reason = "shared with the tests, which use more of it")]
+#[expect(dead_code, clippy::unwrap_used, reason = "shared with the tests, which use more of it")]
 mod world;
 
 fn folded(looks: &[Contribution]) -> Level {
