@@ -1,0 +1,174 @@
+//! Who may know whom: crates by their manifests, modules by the paths that they name.
+
+use std::collections::BTreeSet;
+
+use super::paths;
+use super::sources::Sources;
+
+/// A crate of ours, the crates of ours that it may know, and crates of others that it must not.
+struct CrateRule {
+    folder: &'static str,
+    may_know: &'static [&'static str],
+    never: &'static [&'static str],
+}
+
+const WIRE_AND_STORAGE: &[&str] = &[
+    "axum", "hyper", "indicatif", "metrics", "rand", "reqwest", "serde", "sqlx", "tokio", "tracing",
+];
+
+const CRATES: &[CrateRule] = &[
+    CrateRule { folder: "map", may_know: &[], never: WIRE_AND_STORAGE },
+    CrateRule {
+        folder: "schema",
+        may_know: &["map"],
+        never: &["axum", "hyper", "rand", "reqwest", "sqlx", "tokio", "tower", "tracing"],
+    },
+    CrateRule { folder: "client", may_know: &["map", "schema"], never: &["axum", "sqlx"] },
+    CrateRule { folder: "server", may_know: &["map", "schema"], never: &["indicatif", "reqwest"] },
+    CrateRule { folder: "tests", may_know: &["map", "schema", "client", "server"], never: &[] },
+];
+
+/// A module at the root of a crate and the others there that it may name.
+type ModuleRule = (&'static str, &'static [&'static str]);
+
+/// Everything at a crate's root; `lib` and `main` may name all of it.
+const MODULES: &[(&str, &[ModuleRule])] = &[
+    (
+        "map",
+        &[
+            ("geometry", &[]),
+            ("raster", &["geometry"]),
+            // A vector feature bears the names of the robots that saw it.
+            ("vector", &["geometry", "level"]),
+            ("level", &["geometry", "raster", "vector"]),
+        ],
+    ),
+    (
+        "schema",
+        &[
+            ("slug", &[]),
+            ("route", &[]),
+            ("codec", &[]),
+            ("v1", &[]),
+            ("border", &["v1", "slug"]),
+            ("problem", &["border"]),
+        ],
+    ),
+];
+
+/// Violations among the manifests.
+pub(crate) fn between_crates(sources: &Sources) -> Vec<String> {
+    let mut violations = Vec::new();
+    for (path, text) in sources.within("", "Cargo.toml") {
+        let Some((folder, _)) = path.split_once('/') else { continue };
+        let Some(rule) = CRATES.iter().find(|rule| path == format!("{}/Cargo.toml", rule.folder))
+        else {
+            violations.push(format!("{path}: a crate without a row in the table"));
+            continue;
+        };
+        let manifest = match text.parse::<toml::Table>() {
+            Ok(manifest) => manifest,
+            Err(error) => {
+                violations.push(format!("{path}: {error}"));
+                continue;
+            }
+        };
+        for name in dependencies(&manifest) {
+            let ours = name.strip_prefix("mapfold-");
+            if ours.is_some_and(|ours| ours != folder && !rule.may_know.contains(&ours)) {
+                violations.push(format!("{folder} must not know {name}"));
+            }
+            if rule.never.contains(&name.as_str()) {
+                violations.push(format!("{folder} must not use {name}"));
+            }
+        }
+    }
+    violations
+}
+
+/// Names in every table of dependencies, those of targets included.
+fn dependencies(table: &toml::Table) -> BTreeSet<String> {
+    let mut names = BTreeSet::new();
+    for (key, value) in table {
+        let Some(inner) = value.as_table() else { continue };
+        if key == "dependencies" || key == "dev-dependencies" || key == "build-dependencies" {
+            for (name, detail) in inner {
+                let package = detail.get("package").and_then(toml::Value::as_str);
+                names.insert(package.unwrap_or(name).to_owned());
+            }
+        } else if key == "target" || key.starts_with("cfg(") {
+            names.extend(dependencies(inner));
+        }
+    }
+    names
+}
+
+/// Violations among the modules at the root of each crate that has a table.
+pub(crate) fn between_modules(sources: &Sources) -> Vec<String> {
+    MODULES.iter().flat_map(|(folder, rules)| within_crate(sources, folder, rules)).collect()
+}
+
+fn within_crate(sources: &Sources, folder: &str, rules: &[ModuleRule]) -> Vec<String> {
+    let prefix = format!("{folder}/src/");
+    let mut violations = Vec::new();
+    let mut seen = BTreeSet::new();
+    for (path, text) in sources.within(&prefix, ".rs") {
+        let module: Vec<String> =
+            path[prefix.len()..path.len() - ".rs".len()].split('/').map(str::to_owned).collect();
+        let root = module[0].as_str();
+        if root == "lib" || root == "main" || root == "bin" {
+            continue;
+        }
+        seen.insert(root.to_owned());
+        let Some((_, may_name)) = rules.iter().find(|(name, _)| *name == root) else {
+            violations.push(format!("{path}: module {root} has no row in the table"));
+            continue;
+        };
+        for named in paths::named(text, &module) {
+            let Some(head) = named.first().filter(|head| rules.iter().any(|(name, _)| name == head))
+            else {
+                continue;
+            };
+            if head != root && !may_name.contains(&head.as_str()) {
+                violations.push(format!("{path}: {root} must not know {}", named.join("::")));
+            }
+        }
+    }
+    let gone = rules.iter().filter(|(name, _)| !seen.contains(*name));
+    violations.extend(gone.map(|(name, _)| format!("{folder}: no module {name} any more")));
+    violations
+}
+
+#[test]
+fn a_client_that_knows_the_server_is_found() {
+    let sources = Sources::of([
+        ("client/Cargo.toml", "[dependencies]\nmapfold-map.workspace = true\nmapfold-server = { path = '../server' }"),
+        ("server/Cargo.toml", "[target.'cfg(unix)'.dev-dependencies]\nreqwest = '1'"),
+        ("map/Cargo.toml", "[dependencies]\nwire = { package = 'serde', version = '1' }"),
+        ("tools/Cargo.toml", ""),
+    ]);
+    assert_eq!(between_crates(&sources), [
+        "client must not know mapfold-server",
+        "map must not use serde",
+        "server must not use reqwest",
+        "tools/Cargo.toml: a crate without a row in the table",
+    ]);
+}
+
+#[test]
+fn an_arrow_that_points_up_is_found() {
+    let rules: &[ModuleRule] = &[("low", &[]), ("high", &["low"]), ("gone", &[])];
+    let sources = Sources::of([
+        ("x/src/lib.rs", "pub use high::A;"),
+        ("x/src/low.rs", "use crate::high::A;"),
+        ("x/src/low/part.rs", "use super::super::high; use super::fine; use crate::Error;"),
+        ("x/src/high.rs", "use crate::low::B;"),
+        ("x/src/new.rs", ""),
+    ]);
+    assert_eq!(within_crate(&sources, "x", rules), [
+        "x/src/low.rs: low must not know high::A",
+        "x/src/low/part.rs: low must not know high",
+        "x/src/new.rs: module new has no row in the table",
+        "x: no module gone any more",
+    ]);
+}
