@@ -7,20 +7,23 @@ mod level;
 mod patch;
 mod receipt;
 mod robot;
+mod session;
 mod site;
 mod token;
 
 pub use contribution::{
-    Contribution, ContributionEntry, ContributionPage, ContributionState, EvidencePatch,
-    ObservedCluster, ObservedEnd, ObservedSegment, PoseEstimate, Provenance, TilePatch,
+    Contribution, ContributionEntry, ContributionPage, ContributionRecord, ContributionState,
+    EvidencePatch, ObservedCluster, ObservedEnd, ObservedSegment, PoseEstimate, Provenance,
+    TilePatch,
 };
 pub use event::LevelEvent;
 pub use features::{Cluster, EndKind, Facing, Segment, SensorClass, SolidInterval};
 pub use level::{Bounds, Counts, LevelDescription, NewLevel};
 pub use patch::{Patch, RasterChanges, Removed, TileAddress, TileEvidence, VectorPatch};
-pub use receipt::Receipt;
+pub use receipt::{Receipt, UploadAnswer};
 pub use robot::{
     LastPose, NewRobot, RobotDescription, RobotState, RobotUpdate, SensorKind, SensorProfile,
 };
+pub use session::{NewSession, SessionDescription};
 pub use site::{NewSite, SiteDescription};
 pub use token::{IssuedToken, NewToken, Scope};

@@ -170,6 +170,17 @@ pub struct ContributionEntry {
     pub state: ContributionState,
 }
 
+/// A line of the log with all that was uploaded.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ContributionRecord {
+    /// The line.
+    pub entry: ContributionEntry,
+    /// SHA-256 of its canonical CBOR, lower-case hexadecimal.
+    pub digest: String,
+    /// What was uploaded.
+    pub contribution: Contribution,
+}
+
 /// A page of the log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ContributionPage {

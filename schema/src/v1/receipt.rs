@@ -5,6 +5,7 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::ContributionState;
+use crate::problem::Problem;
 
 /// The contribution is on disk. The same id gets the same receipt, however often it is sent.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -19,4 +20,14 @@ pub struct Receipt {
     pub state: ContributionState,
     /// SHA-256 of its canonical CBOR, lower-case hexadecimal.
     pub digest: String,
+}
+
+/// The answer to one contribution of an array: either `{"receipt": ..}` or `{"problem": ..}`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum UploadAnswer {
+    /// It is on disk.
+    Receipt(Receipt),
+    /// It is not.
+    Problem(Problem),
 }
