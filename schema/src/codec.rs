@@ -4,7 +4,7 @@
 //! integers); all else is as in JSON.
 
 use serde::Serialize;
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, IgnoredAny};
 
 use crate::border::Violation;
 use crate::v1;
@@ -148,10 +148,10 @@ pub fn from_cbor<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, DecodeError> {
     }
 }
 
-/// Why reading JSON failed. Only now is the body read again with its path kept: the way without
-/// fault pays nothing for it.
+/// Why reading JSON failed. Only now is the body read again, first whether it is JSON at all, then
+/// with its path kept: the way without fault pays nothing for it.
 fn json_error<T: DeserializeOwned>(bytes: &[u8], error: &serde_json::Error) -> DecodeError {
-    if !error.is_data() {
+    if let Err(error) = serde_json::from_slice::<IgnoredAny>(bytes) {
         return DecodeError::Json(error.to_string());
     }
     let mut deserializer = serde_json::Deserializer::from_slice(bytes);

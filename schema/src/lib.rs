@@ -13,6 +13,7 @@
 //! * [`codec`]: JSON and CBOR.
 //! * [`digest`]: by what a contribution's content is known.
 //! * [`instant`]: RFC 3339 and microseconds.
+//! * `malformed` (with the feature of that name): a catalogue of contributions to refuse.
 //! * [`problem`]: RFC 9457 problems.
 //! * [`route`]: every path, once.
 
@@ -20,6 +21,8 @@ pub mod border;
 pub mod codec;
 pub mod digest;
 pub mod instant;
+#[cfg(feature = "malformed")]
+pub mod malformed;
 pub mod problem;
 pub mod route;
 pub mod slug;
