@@ -1,0 +1,17 @@
+//! Evidence from readings: what one look says about which cells are free and which are occupied.
+//!
+//! Works in the level frame, on the level's grid. Knows nothing of maps: the evidence of a look is
+//! the same whatever others have seen, which is what lets it be added in any order and taken out.
+//!
+//! * [`scanner_evidence`]: narrow beams.
+//! * [`sonar_evidence`]: wide cones.
+//! * [`Canvas`]: where a look's evidence comes together before it becomes a patch.
+
+mod canvas;
+mod scanner;
+mod sonar;
+mod walk;
+
+pub use canvas::Canvas;
+pub use scanner::{ScannerEvidenceConfig, beam_evidence, scanner_evidence};
+pub use sonar::{SonarEvidenceConfig, sonar_evidence};
