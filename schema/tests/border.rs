@@ -1,7 +1,5 @@
 //! What gets through the border and what does not.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use mapfold_schema::border::{
     DEFAULT_LIMITS, Target, VIOLATIONS_MAX, Violation, check_contribution,
 };
