@@ -1,0 +1,258 @@
+//! Reading a level's log.
+
+use mapfold_schema::instant::to_rfc3339;
+use mapfold_schema::v1;
+use sqlx::any::AnyRow;
+use uuid::Uuid;
+
+use super::payload::{self, Payload};
+use super::row::{corrupt, count, get};
+use super::{Store, StoreError};
+
+const TABLE: &str = "contributions";
+
+/// Which lines of a log are asked for; what is absent does not matter.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LogFilter {
+    /// Only of this robot.
+    pub robot: Option<String>,
+    /// Only in this state.
+    pub state: Option<v1::ContributionState>,
+    /// Only after this revision.
+    pub since: Option<i64>,
+    /// Only from poses in this rectangle.
+    pub bbox: Option<v1::Bounds>,
+}
+
+/// A row of the log as the fold reads it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LogRow {
+    /// Its place in the log.
+    pub revision: i64,
+    /// What has become of it.
+    pub state: v1::ContributionState,
+    /// SHA-256 of its canonical CBOR, lower-case hexadecimal.
+    pub digest: String,
+    /// What was uploaded.
+    pub payload: Payload,
+}
+
+/// A row of the log as opening a level reads it: without its evidence.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FeaturesRow {
+    /// Its place in the log.
+    pub revision: i64,
+    /// What has become of it.
+    pub state: v1::ContributionState,
+    /// CBOR of the contribution without its evidence.
+    pub features: Vec<u8>,
+}
+
+/// The columns that make a [`v1::ContributionEntry`].
+macro_rules! entry_columns {
+    () => {
+        "contribution, revision, robot, observed_at_us, received_at_us, emulated, segment_count, \
+         cluster_count, tile_count, x_m, y_m, heading_rad, state"
+    };
+}
+
+/// The conditions of a page, but for the robot's.
+macro_rules! page_conditions {
+    () => {
+        " from contributions where site = $1 and level = $2 and revision < $3 and revision > $4 \
+         and ($6 is null or state = $6) and ($7 is null or (x_m >= $7 and y_m >= $8 \
+         and x_m <= $9 and y_m <= $10))"
+    };
+}
+
+impl Store {
+    /// A page of a level's log, newest first: at most `limit` lines that pass the filter, older
+    /// than revision `before` if there is one. The answer's `next` is the `before` of the next page.
+    ///
+    /// # Errors
+    /// The store fails.
+    pub async fn log_page(
+        &self,
+        site: &str,
+        level: &str,
+        filter: &LogFilter,
+        before: Option<i64>,
+        limit: u32,
+    ) -> Result<v1::ContributionPage, StoreError> {
+        // Two texts, so that the engine takes the index of the robot where there is one.
+        let text = if filter.robot.is_some() {
+            concat!(
+                "select ",
+                entry_columns!(),
+                page_conditions!(),
+                " and robot = $5 order by revision desc limit $11"
+            )
+        } else {
+            concat!(
+                "select ",
+                entry_columns!(),
+                page_conditions!(),
+                " and $5 is null order by revision desc limit $11"
+            )
+        };
+        let corner = |read: fn(&v1::Bounds) -> f64| filter.bbox.as_ref().map(read);
+        let rows = sqlx::query(text)
+            .bind(site)
+            .bind(level)
+            .bind(before.unwrap_or(i64::MAX))
+            .bind(filter.since.unwrap_or(0))
+            .bind(filter.robot.as_deref())
+            .bind(filter.state.map(state_text))
+            .bind(corner(|b| b.min_x_m))
+            .bind(corner(|b| b.min_y_m))
+            .bind(corner(|b| b.max_x_m))
+            .bind(corner(|b| b.max_y_m))
+            .bind(i64::from(limit) + 1)
+            .fetch_all(self.reads())
+            .await?;
+        let mut contributions = rows.iter().map(entry).collect::<Result<Vec<_>, _>>()?;
+        let more = contributions.len() > limit as usize;
+        contributions.truncate(limit as usize);
+        let next = contributions.last().filter(|_| more).map(|last| last.revision.to_string());
+        Ok(v1::ContributionPage { contributions, next })
+    }
+
+    /// One contribution of a level's log, whole.
+    ///
+    /// # Errors
+    /// The store fails, or the row is spoilt.
+    pub async fn contribution(
+        &self,
+        site: &str,
+        level: &str,
+        id: Uuid,
+    ) -> Result<Option<v1::ContributionRecord>, StoreError> {
+        let row = sqlx::query(concat!(
+            "select ",
+            entry_columns!(),
+            ", digest, features, evidence from contributions \
+             where site = $1 and level = $2 and contribution = $3"
+        ))
+        .bind(site)
+        .bind(level)
+        .bind(id.to_string())
+        .fetch_optional(self.reads())
+        .await?;
+        let Some(row) = row else { return Ok(None) };
+        let LogRow { digest, payload, .. } = log_row(&row)?;
+        let contribution = payload::join(&payload.features, &payload.evidence)
+            .map_err(|e| corrupt(TABLE, id.to_string(), e))?;
+        Ok(Some(v1::ContributionRecord { entry: entry(&row)?, digest, contribution }))
+    }
+
+    /// The next rows of a level's log after revision `after`, oldest first, at most `limit`.
+    ///
+    /// # Errors
+    /// The store fails, or a row is spoilt.
+    pub async fn log_after(
+        &self,
+        site: &str,
+        level: &str,
+        after: i64,
+        limit: u32,
+    ) -> Result<Vec<LogRow>, StoreError> {
+        let rows = sqlx::query(
+            "select revision, state, digest, features, evidence from contributions \
+             where site = $1 and level = $2 and revision > $3 order by revision limit $4",
+        )
+        .bind(site)
+        .bind(level)
+        .bind(after)
+        .bind(i64::from(limit))
+        .fetch_all(self.reads())
+        .await?;
+        rows.iter().map(log_row).collect()
+    }
+
+    /// The next rows of a level's log after revision `after` and up to revision `until`, oldest
+    /// first, at most `limit`, without their evidence.
+    ///
+    /// # Errors
+    /// The store fails, or a row is spoilt.
+    pub async fn features_after(
+        &self,
+        site: &str,
+        level: &str,
+        after: i64,
+        until: i64,
+        limit: u32,
+    ) -> Result<Vec<FeaturesRow>, StoreError> {
+        let rows = sqlx::query(
+            "select revision, state, features from contributions where site = $1 and level = $2 \
+             and revision > $3 and revision <= $4 order by revision limit $5",
+        )
+        .bind(site)
+        .bind(level)
+        .bind(after)
+        .bind(until)
+        .bind(i64::from(limit))
+        .fetch_all(self.reads())
+        .await?;
+        rows.iter()
+            .map(|row| {
+                Ok(FeaturesRow {
+                    revision: get(row, TABLE, "revision")?,
+                    state: state(row)?,
+                    features: get(row, TABLE, "features")?,
+                })
+            })
+            .collect()
+    }
+}
+
+pub(super) fn state_text(state: v1::ContributionState) -> &'static str {
+    match state {
+        v1::ContributionState::Folded => "folded",
+        v1::ContributionState::Held => "held",
+        v1::ContributionState::Reverted => "reverted",
+    }
+}
+
+pub(super) fn parse_state(text: &str) -> Result<v1::ContributionState, StoreError> {
+    match text {
+        "folded" => Ok(v1::ContributionState::Folded),
+        "held" => Ok(v1::ContributionState::Held),
+        "reverted" => Ok(v1::ContributionState::Reverted),
+        _ => Err(corrupt(TABLE, "state", format!("{text:?} is no state of a contribution"))),
+    }
+}
+
+fn state(row: &AnyRow) -> Result<v1::ContributionState, StoreError> {
+    let text: String = get(row, TABLE, "state")?;
+    parse_state(&text)
+}
+
+fn log_row(row: &AnyRow) -> Result<LogRow, StoreError> {
+    Ok(LogRow {
+        revision: get(row, TABLE, "revision")?,
+        state: state(row)?,
+        digest: get(row, TABLE, "digest")?,
+        payload: Payload {
+            features: get(row, TABLE, "features")?,
+            evidence: get(row, TABLE, "evidence")?,
+        },
+    })
+}
+
+fn entry(row: &AnyRow) -> Result<v1::ContributionEntry, StoreError> {
+    let id: String = get(row, TABLE, "contribution")?;
+    let emulated: i64 = get(row, TABLE, "emulated")?;
+    Ok(v1::ContributionEntry {
+        id: id.parse().map_err(|e| corrupt(TABLE, id, e))?,
+        revision: get(row, TABLE, "revision")?,
+        robot: get(row, TABLE, "robot")?,
+        observed_at: to_rfc3339(get(row, TABLE, "observed_at_us")?),
+        received_at: to_rfc3339(get(row, TABLE, "received_at_us")?),
+        emulated: emulated != 0,
+        segments: count(row, TABLE, "segment_count")?,
+        clusters: count(row, TABLE, "cluster_count")?,
+        tiles: count(row, TABLE, "tile_count")?,
+        pose: [get(row, TABLE, "x_m")?, get(row, TABLE, "y_m")?, get(row, TABLE, "heading_rad")?],
+        state: state(row)?,
+    })
+}
