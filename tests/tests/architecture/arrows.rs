@@ -13,7 +13,16 @@ struct CrateRule {
 }
 
 const WIRE_AND_STORAGE: &[&str] = &[
-    "axum", "hyper", "indicatif", "metrics", "rand", "reqwest", "serde", "sqlx", "tokio", "tracing",
+    "axum",
+    "hyper",
+    "indicatif",
+    "metrics",
+    "rand",
+    "reqwest",
+    "serde",
+    "sqlx",
+    "tokio",
+    "tracing",
 ];
 
 const CRATES: &[CrateRule] = &[
@@ -125,7 +134,8 @@ fn within_crate(sources: &Sources, folder: &str, rules: &[ModuleRule]) -> Vec<St
             continue;
         };
         for named in paths::named(text, &module) {
-            let Some(head) = named.first().filter(|head| rules.iter().any(|(name, _)| name == head))
+            let Some(head) =
+                named.first().filter(|head| rules.iter().any(|(name, _)| name == head))
             else {
                 continue;
             };
@@ -142,17 +152,23 @@ fn within_crate(sources: &Sources, folder: &str, rules: &[ModuleRule]) -> Vec<St
 #[test]
 fn a_client_that_knows_the_server_is_found() {
     let sources = Sources::of([
-        ("client/Cargo.toml", "[dependencies]\nmapfold-map.workspace = true\nmapfold-server = { path = '../server' }"),
+        (
+            "client/Cargo.toml",
+            "[dependencies]\nmapfold-map.workspace = true\nmapfold-server = { path = '../server' }",
+        ),
         ("server/Cargo.toml", "[target.'cfg(unix)'.dev-dependencies]\nreqwest = '1'"),
         ("map/Cargo.toml", "[dependencies]\nwire = { package = 'serde', version = '1' }"),
         ("tools/Cargo.toml", ""),
     ]);
-    assert_eq!(between_crates(&sources), [
-        "client must not know mapfold-server",
-        "map must not use serde",
-        "server must not use reqwest",
-        "tools/Cargo.toml: a crate without a row in the table",
-    ]);
+    assert_eq!(
+        between_crates(&sources),
+        [
+            "client must not know mapfold-server",
+            "map must not use serde",
+            "server must not use reqwest",
+            "tools/Cargo.toml: a crate without a row in the table",
+        ]
+    );
 }
 
 #[test]
@@ -165,10 +181,13 @@ fn an_arrow_that_points_up_is_found() {
         ("x/src/high.rs", "use crate::low::B;"),
         ("x/src/new.rs", ""),
     ]);
-    assert_eq!(within_crate(&sources, "x", rules), [
-        "x/src/low.rs: low must not know high::A",
-        "x/src/low/part.rs: low must not know high",
-        "x/src/new.rs: module new has no row in the table",
-        "x: no module gone any more",
-    ]);
+    assert_eq!(
+        within_crate(&sources, "x", rules),
+        [
+            "x/src/low.rs: low must not know high::A",
+            "x/src/low/part.rs: low must not know high",
+            "x/src/new.rs: module new has no row in the table",
+            "x: no module gone any more",
+        ]
+    );
 }

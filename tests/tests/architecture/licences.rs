@@ -144,12 +144,19 @@ fn policy() -> Policy {
 #[test]
 fn licence_expressions_are_read_as_spdx_means_them() {
     let policy = policy();
-    for met in ["MIT", "MIT/GPL-3.0", "GPL-3.0 OR MIT", "MIT AND ISC", "(GPL-3.0 OR MIT) AND ISC",
-        "Apache-2.0 WITH LLVM-exception OR GPL-3.0"]
-    {
+    for met in [
+        "MIT",
+        "MIT/GPL-3.0",
+        "GPL-3.0 OR MIT",
+        "MIT AND ISC",
+        "(GPL-3.0 OR MIT) AND ISC",
+        "Apache-2.0 WITH LLVM-exception OR GPL-3.0",
+    ] {
         assert!(policy.allows(met), "{met}");
     }
-    for unmet in ["", "GPL-3.0", "MIT AND GPL-3.0", "Apache-2.0", "(MIT OR ISC) AND GPL-3.0", "MIT ISC"] {
+    for unmet in
+        ["", "GPL-3.0", "MIT AND GPL-3.0", "Apache-2.0", "(MIT OR ISC) AND GPL-3.0", "MIT ISC"]
+    {
         assert!(!policy.allows(unmet), "{unmet}");
     }
 }
@@ -161,11 +168,14 @@ fn bans_and_strange_sources_are_found() {
                 [[package]]\nname = 'stray'\n\
                 [[package]]\nname = 'mapfold-map'\n\
                 [[package]]\nname = 'fine'\nsource = 'registry+x'";
-    assert_eq!(locked(&policy(), lock), [
-        "openssl is banned by deny.toml",
-        "forked comes from git+y",
-        "stray lies beside the workspace"
-    ]);
+    assert_eq!(
+        locked(&policy(), lock),
+        [
+            "openssl is banned by deny.toml",
+            "forked comes from git+y",
+            "stray lies beside the workspace"
+        ]
+    );
     let listed = [("a v1".to_owned(), "MIT".to_owned()), ("b v2".to_owned(), String::new())];
     assert_eq!(refused(&policy(), &listed), ["b v2: licence \"\""]);
 }

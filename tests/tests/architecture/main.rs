@@ -72,7 +72,10 @@ fn dependencies_are_permissive_and_from_the_registry() {
     let sources = repository();
     let policy = licences::Policy::parse(sources.text("deny.toml").expect("deny.toml"));
     let policy = policy.expect("deny.toml is readable");
-    assert_none("bans and sources", &licences::locked(&policy, sources.text("Cargo.lock").expect("Cargo.lock")));
+    assert_none(
+        "bans and sources",
+        &licences::locked(&policy, sources.text("Cargo.lock").expect("Cargo.lock")),
+    );
     let listed = licences::list(&sources::root()).expect("cargo tree lists the dependencies");
     assert!(listed.len() > 50, "cargo tree listed only {} packages", listed.len());
     assert_none("licences", &licences::refused(&policy, &listed));

@@ -160,7 +160,10 @@ fn heads(source: &str, module: &[&str]) -> Vec<String> {
 #[test]
 fn use_trees_are_followed_into_their_braces() {
     assert_eq!(
-        heads("use crate::{geometry::{Point, Pose as P}, raster::Tile};\nuse std::fmt;", &["level"]),
+        heads(
+            "use crate::{geometry::{Point, Pose as P}, raster::Tile};\nuse std::fmt;",
+            &["level"]
+        ),
         ["geometry::Point", "geometry::Pose", "raster::Tile"]
     );
 }
@@ -168,11 +171,12 @@ fn use_trees_are_followed_into_their_braces() {
 #[test]
 fn super_means_the_module_above_and_inline_modules_count() {
     assert_eq!(heads("use super::store::Row;", &["level"]), ["store::Row"]);
-    assert_eq!(heads("use super::Map; use super::super::http::State;", &["level", "fold"]), [
-        "level::Map",
-        "http::State"
-    ]);
-    let nested = "fn f() { if a { b } } mod tests { use super::*; use super::super::raster::Cell; }";
+    assert_eq!(
+        heads("use super::Map; use super::super::http::State;", &["level", "fold"]),
+        ["level::Map", "http::State"]
+    );
+    let nested =
+        "fn f() { if a { b } } mod tests { use super::*; use super::super::raster::Cell; }";
     assert_eq!(heads(nested, &["level", "fold"]), ["level::fold::*", "level::raster::Cell"]);
     assert_eq!(heads("mod inner { fn f() {} } use super::x;", &["a"]), ["x"]);
 }

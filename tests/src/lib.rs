@@ -1,0 +1,31 @@
+//! What the end-to-end checks are made of: real programs on real logs, and independent measures of
+//! the maps that come out.
+//!
+//! Everything here looks at Mapfold from outside: it starts `mapfold-server` and `mapfold-robot`,
+//! talks HTTP, and reads the wire types. It deliberately shares no geometry, no noise model and no
+//! log reader with the code that it checks.
+//!
+//! * [`carmen`]: reads laser logs and cuts them into parts, one for each robot of a fleet.
+//! * [`plane`], [`floor`], [`coverage`]: the merged map as plain shapes, and how well it agrees
+//!   with the readings that it was made of.
+//! * [`simulation`]: worlds of walls, drives through them with odometry noise, scanners, sonars.
+//! * [`programs`], [`database`], [`server`], [`robot`], [`fleet`], [`meter`], [`api`]: the real
+//!   programs, the network between them, and what they answer.
+//! * [`report`]: tables between markers in a page of text.
+
+pub mod api;
+pub mod carmen;
+pub mod coverage;
+pub mod database;
+pub mod error;
+pub mod fleet;
+pub mod floor;
+pub mod meter;
+pub mod plane;
+pub mod programs;
+pub mod report;
+pub mod robot;
+pub mod server;
+pub mod simulation;
+
+pub use error::Error;

@@ -1,0 +1,21 @@
+//! Simulated robots in simulated buildings, written down as CARMEN logs: what the evaluation plays
+//! where the recorded logs are not at hand, and where the truth must be known.
+//!
+//! What is simulated: straight walls, drives with odometry that drifts, corrected poses as good as
+//! those of a good SLAM, scanners with range noise and lost returns, rings of sonars with wide
+//! cones and mirroring walls. What is not: people, slopes, motion during a scan. Chance comes from
+//! the seed alone.
+
+mod drive;
+mod noise;
+mod recorder;
+mod scanner;
+mod sonar;
+mod world;
+
+pub use drive::{Odometry, Pose, Stop, drive};
+pub use noise::Noise;
+pub use recorder::{Recording, record};
+pub use scanner::Scanner;
+pub use sonar::SonarRing;
+pub use world::{World, hall, office};
