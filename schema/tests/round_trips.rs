@@ -159,7 +159,8 @@ fn cells<T: Copy + Default + std::fmt::Debug + 'static>(
 }
 
 fn key() -> impl Strategy<Value = TileKey> {
-    (class(), any::<i32>(), any::<i32>())
+    const MAX: i32 = i32::MAX / 64 - 1;
+    (class(), -MAX..=MAX, -MAX..=MAX)
         .prop_map(|(class, x, y)| TileKey { class, tile: TileIndex { x, y } })
 }
 
@@ -422,6 +423,7 @@ fn a_patch_names_the_places_of_its_faults() {
             tile(vec![0, i32::MAX, 5]),
             tile(vec![4, 1, 5, 4, 1, 5]),
             tile(vec![4, 1, 0]),
+            v1::TileEvidence { x: i32::MIN, ..tile(vec![]) },
         ],
         removed: v1::Removed { segments: vec!["x".to_owned()], ..v1::Removed::default() },
     };
@@ -437,6 +439,7 @@ fn a_patch_names_the_places_of_its_faults() {
         ("bad_run", "/tiles/3/runs/0"),
         ("bad_run", "/tiles/4/runs/3"),
         ("bad_run", "/tiles/5/runs/0"),
+        ("out_of_range", "/tiles/6/x"),
         ("bad_feature_id", "/removed/segments/0"),
     ];
     assert_eq!(said, expected.map(|(code, pointer)| (code.to_owned(), pointer.to_owned())));

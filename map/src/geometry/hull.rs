@@ -5,7 +5,8 @@ use super::Point;
 /// The convex hull, counter-clockwise from the lowest-leftmost point, without collinear points
 /// (Andrew's monotone chain, O(n log n)). One or two distinct points give themselves.
 pub fn convex_hull(points: &[Point]) -> Vec<Point> {
-    let mut sorted: Vec<Point> = points.to_vec();
+    // Adding 0 makes -0 into 0: two names of one coordinate would sort apart and lose points.
+    let mut sorted: Vec<Point> = points.iter().map(|p| p.add_scalar(0.0)).collect();
     sorted.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     sorted.dedup();
     if sorted.len() < 3 {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use mapfold_map::geometry::{Interval, Line, Point};
 use mapfold_map::level::{self, ContributionId, FeatureId, RobotName};
-use mapfold_map::raster::{TILE_CELLS, Tile, TileIndex, TileKey};
+use mapfold_map::raster::{TILE_CELLS, TILE_SIDE, Tile, TileIndex, TileKey};
 use mapfold_map::vector::{Cluster, Segment, SolidInterval};
 use uuid::Uuid;
 
@@ -17,6 +17,9 @@ use crate::v1;
 
 /// Largest coordinate along a line that a millimetre text survives, metres: far beyond any level.
 const ALONG_MAX_M: f64 = 1e9;
+
+/// Farthest tile whose cells' numbers fit 32 bits.
+pub(super) const TILE_INDEX_MAX: u32 = i32::MAX as u32 / TILE_SIDE as u32 - 1;
 
 /// The text form of a feature's identity: `<contribution uuid>-<index>`.
 pub fn feature_id(id: &FeatureId) -> String {
@@ -330,6 +333,11 @@ fn read_tile(
     place: &Place<'_>,
     wrong: &mut Violations,
 ) -> Option<(TileKey, Tile)> {
+    for (at, name) in [(tile.x, "x"), (tile.y, "y")] {
+        if at.unsigned_abs() > TILE_INDEX_MAX {
+            wrong.add(&place.field(name), "out_of_range", "this lies beyond any level");
+        }
+    }
     let place = place.field("runs");
     let mut cells = Box::new([0; TILE_CELLS]);
     let (runs, rest) = tile.runs.as_chunks::<3>();

@@ -7,11 +7,9 @@ use mapfold_map::raster::{
 };
 
 use crate::border::Target;
+use crate::border::features::TILE_INDEX_MAX;
 use crate::border::violations::{Place, Violations};
 use crate::v1;
-
-/// Tiles beyond this have cells whose numbers do not fit 32 bits, whatever the limits say.
-const TILE_INDEX_MAX: i32 = i32::MAX / TILE_SIDE as i32 - 1;
 
 pub(super) fn check(
     evidence: &[v1::EvidencePatch],
@@ -83,7 +81,8 @@ fn check_index(index: i32, target: &Target, place: &Place<'_>, wrong: &mut Viola
     let far = if index < 0 { f64::from(index) } else { f64::from(index) + 1.0 };
     let edge_m = far * TILE_SIDE as f64 * target.resolution_m;
     let max_m = target.limits.coordinate_max_m;
-    let within = edge_m.abs() <= max_m && index.abs() <= TILE_INDEX_MAX;
+    // The second holds whatever the limits say.
+    let within = edge_m.abs() <= max_m && index.unsigned_abs() <= TILE_INDEX_MAX;
     if !within {
         wrong.add(
             place,
