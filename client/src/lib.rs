@@ -1,0 +1,19 @@
+//! The robot's side of Mapfold: readings in, contributions out, the shared map back.
+//!
+//! Knows no SQL and serves nothing. Lengths are metres, angles radians, instants seconds of a
+//! log's clock or microseconds since 1970; frames as in `mapfold_map`. Libraries here read no
+//! clock and no randomness of their own: `main.rs` passes both in.
+//!
+//! * [`sensor`]: profiles of sensors and the readings they give: the ground.
+//! * [`log`]: readers of recorded robot logs.
+//! * [`perception`]: from a scan to segments and clusters.
+//! * [`evidence`]: from a scan or a ring of sonars to evidence for the grid (written by the lead: use it).
+//! * [`emulation`]: a ring of sonars out of a scanner (written by the lead: use it).
+//! * `sync` is being written by another person in client/src/sync/: use it.
+
+pub mod emulation;
+pub mod evidence;
+pub mod log;
+pub mod perception;
+pub mod sensor;
+pub mod sync;

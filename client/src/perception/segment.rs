@@ -1,0 +1,53 @@
+//! From the sensor's frame to the robot's.
+
+use mapfold_map::geometry::{Pose, Robot, Sensor, UncertainLine};
+use mapfold_map::vector::{Facing, ObservedCluster, ObservedSegment};
+use nalgebra::Matrix2;
+
+use super::clusters::FoundCluster;
+use super::ends::Ended;
+use super::split::FoundLine;
+use crate::sensor::Scan;
+
+/// A line with its ends as the robot hands it in; `None` if rounding left it no length.
+pub(super) fn in_robot_frame(
+    line: &FoundLine,
+    ended: &Ended,
+    scan: &Scan,
+) -> Option<ObservedSegment> {
+    let robot_from_sensor: &Pose<Robot, Sensor> = &scan.robot_from_sensor;
+    let moved = robot_from_sensor.act_on_line(&line.fit.line.line);
+    let covariance = line.fit.line.covariance.transformed(&moved.j_line_line);
+    let (uncertain, turned) =
+        UncertainLine::<Robot>::normal_form(moved.rho, moved.alpha, covariance);
+    // Along the moved tangent, coordinates shift by the sensor's own: that is `j_line_line`'s tau.
+    let shift = moved.j_line_line[(0, 1)];
+    let (from, to) = (ended.from + shift, ended.to + shift);
+    let [lower, upper] = ended.ends;
+    let (from, to, ends) =
+        if turned { (-to, -from, [upper, lower]) } else { (from, to, [lower, upper]) };
+    // A wall is seen from where the sensor is, which need not be the robot's centre's side.
+    let across = uncertain.line.across(&robot_from_sensor.position());
+    let facing =
+        if across < 0.0 || (across == 0.0 && !turned) { Facing::Origin } else { Facing::Away };
+    (to > from && from.is_finite() && to.is_finite()).then_some(ObservedSegment {
+        line: uncertain,
+        from,
+        to,
+        facing,
+        ends,
+        points: line.members.len() as u32,
+    })
+}
+
+/// A cluster as the robot hands it in.
+pub(super) fn cluster_in_robot_frame(cluster: &FoundCluster, scan: &Scan) -> ObservedCluster {
+    let pose = &scan.robot_from_sensor;
+    let (s, c) = pose.heading().sin_cos();
+    ObservedCluster {
+        hull: cluster.hull.iter().map(|p| pose.act(p)).collect(),
+        centroid: pose.act(&cluster.centroid),
+        covariance: cluster.covariance.transformed(&Matrix2::new(c, -s, s, c)),
+        points: cluster.members.len() as u32,
+    }
+}

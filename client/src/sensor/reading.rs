@@ -1,0 +1,84 @@
+//! Readings: scans of beams, and the echoes of a ring of sonars.
+
+use std::f64::consts::TAU;
+
+use mapfold_map::geometry::{Point, Pose, Robot, Sensor, unit_normal};
+
+/// Where the beams of a scan point, in the sensor frame, counter-clockwise from `first_bearing`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScanGeometry {
+    /// Bearing of beam 0, radians.
+    pub first_bearing: f64,
+    /// Angle from one beam to the next, radians, positive.
+    pub increment: f64,
+}
+
+impl ScanGeometry {
+    /// Bearing of a beam, radians, not wrapped.
+    pub fn bearing(&self, beam: usize) -> f64 {
+        self.first_bearing + self.increment * beam as f64
+    }
+
+    /// Whether `count` beams go all the way round, so that the last is the first one's neighbour.
+    pub fn is_full_circle(&self, count: usize) -> bool {
+        count > 2 && (self.increment * count as f64 - TAU).abs() < 0.5 * self.increment
+    }
+}
+
+/// One sweep of a scanner.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scan {
+    /// Where the beams point.
+    pub geometry: ScanGeometry,
+    /// One range a beam, metres, as the sensor gave it: 0, not finite, or at or beyond `range_max`
+    /// where there was no return.
+    pub ranges: Vec<f64>,
+    /// Ranges from here on mean "no return", metres.
+    pub range_max: f64,
+    /// Where the scanner sits.
+    pub robot_from_sensor: Pose<Robot, Sensor>,
+}
+
+impl Scan {
+    /// The unit vector along a beam, in the sensor frame.
+    pub fn direction(&self, beam: usize) -> Point {
+        unit_normal(self.geometry.bearing(beam))
+    }
+
+    /// Whether the scan closes on itself.
+    pub fn is_full_circle(&self) -> bool {
+        self.geometry.is_full_circle(self.ranges.len())
+    }
+}
+
+/// What one sonar of a ring heard.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sonar {
+    /// Where the transducer sits; it listens along its own x.
+    pub robot_from_sensor: Pose<Robot, Sensor>,
+    /// Distance of the first echo, metres; `None` without echo.
+    pub range: Option<f64>,
+}
+
+/// What all sonars of a robot heard at about the same time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ring {
+    /// Full width of each cone, radians.
+    pub cone: f64,
+    /// The sonars in their order round the robot: neighbours here are neighbours there.
+    pub sonars: Vec<Sonar>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_circle_closes_when_one_more_beam_would_repeat_the_first() {
+        let one_degree = ScanGeometry { first_bearing: 0.0, increment: 1f64.to_radians() };
+        assert!(one_degree.is_full_circle(360));
+        assert!(!one_degree.is_full_circle(181));
+        assert!(!one_degree.is_full_circle(359));
+        assert!(!one_degree.is_full_circle(361));
+    }
+}
