@@ -1,0 +1,172 @@
+//! What can be said on the command line.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use mapfold_schema::v1::Scope;
+use serde::Serialize;
+
+/// Keeps the log of what robots saw, folds it into one map per level, and shares the map.
+///
+/// Every setting can also be given as a variable (`MAPFOLD_LISTEN`, ...) or in a TOML file; the command
+/// line goes before the variables, and these before the file. On the very first start the token in
+/// `MAPFOLD_ADMIN_TOKEN` becomes the admin token; without it one is made and printed once.
+#[derive(Debug, Parser)]
+#[command(name = "mapfold-server", version)]
+pub(super) struct Arguments {
+    /// A TOML file with settings.
+    #[arg(long, value_name = "FILE", env = "MAPFOLD_CONFIG", global = true)]
+    pub(super) config: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) settings: Settings,
+    #[command(subcommand)]
+    pub(super) command: Option<Command>,
+}
+
+/// Settings, as `Config` names them; what is not said is left out.
+#[derive(Debug, Args, Serialize)]
+pub(super) struct Settings {
+    /// `sqlite:///path/to/file.db` or `postgres://user:password@host/name` [default: a file in the
+    /// data folder]
+    #[arg(long, value_name = "URL", global = true)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    database: Option<String>,
+    /// Where to listen [default: 127.0.0.1:7171]
+    #[arg(long, value_name = "ADDR", global = true)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    listen: Option<SocketAddr>,
+    /// Where the embedded database is kept [default: ./mapfold-data]
+    #[arg(long, value_name = "DIR", global = true)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    data_dir: Option<PathBuf>,
+    /// Listen beyond this machine although tokens and maps then travel unencrypted
+    #[arg(long, global = true)]
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    insecure_http: bool,
+    /// What to log, for instance `info` or `mapfold_server=debug`
+    #[arg(long, value_name = "FILTER", global = true)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    log: Option<String>,
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// Serve; what happens if no command is given
+    Serve,
+    /// Make, list and revoke tokens
+    #[command(subcommand)]
+    Token(TokenCommand),
+    /// Write a level's map as a file of another program
+    Export(ExportCommand),
+    /// Refold the log and compare it with what is stored; fails if anything differs
+    Verify(VerifyCommand),
+    /// Copy the whole embedded database, also while a server runs on it
+    Backup(BackupCommand),
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum TokenCommand {
+    /// Make a token and print it, once
+    Create(TokenCreate),
+    /// List tokens, without their secrets
+    List,
+    /// Revoke a token, and the sessions made from it
+    Revoke {
+        /// Its public id
+        id: String,
+    },
+}
+
+#[derive(Debug, Args)]
+pub(super) struct TokenCreate {
+    /// The only site that it reaches; all sites if none
+    #[arg(long)]
+    pub(super) site: Option<String>,
+    /// The robot that it speaks for (needs --site)
+    #[arg(long, requires = "site")]
+    pub(super) robot: Option<String>,
+    /// What it allows; may be given several times
+    #[arg(long = "scope", value_enum, required = true)]
+    pub(super) scopes: Vec<ScopeName>,
+    /// Days until it ends; never if not given
+    #[arg(long, value_parser = clap::value_parser!(i64).range(1..=36_500))]
+    pub(super) days: Option<i64>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(super) enum ScopeName {
+    #[value(name = "map:read")]
+    MapRead,
+    #[value(name = "map:contribute")]
+    MapContribute,
+    #[value(name = "map:edit")]
+    MapEdit,
+    #[value(name = "map:publish")]
+    MapPublish,
+    #[value(name = "admin")]
+    Admin,
+}
+
+impl From<ScopeName> for Scope {
+    fn from(name: ScopeName) -> Self {
+        match name {
+            ScopeName::MapRead => Self::MapRead,
+            ScopeName::MapContribute => Self::MapContribute,
+            ScopeName::MapEdit => Self::MapEdit,
+            ScopeName::MapPublish => Self::MapPublish,
+            ScopeName::Admin => Self::Admin,
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ExportCommand {
+    /// The format
+    pub(super) format: ExportFormat,
+    /// Slug of the site
+    #[arg(long)]
+    pub(super) site: String,
+    /// Slug of the level
+    #[arg(long)]
+    pub(super) level: String,
+    /// The file to write; for nav2 the YAML, with `map.pgm` beside it
+    #[arg(long, value_name = "FILE")]
+    pub(super) out: PathBuf,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(super) enum ExportFormat {
+    /// Segments and clusters in metres
+    Geojson,
+    /// `map.yaml` and `map.pgm`
+    Nav2,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct VerifyCommand {
+    /// Only this site
+    #[arg(long)]
+    pub(super) site: Option<String>,
+    /// Only this level (needs --site)
+    #[arg(long, requires = "site")]
+    pub(super) level: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct BackupCommand {
+    /// The copy; must not exist yet
+    pub(super) file: PathBuf,
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::*;
+
+    #[test]
+    fn the_arguments_do_not_contradict_each_other() {
+        Arguments::command().debug_assert();
+    }
+}

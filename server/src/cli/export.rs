@@ -1,0 +1,77 @@
+//! `export`: a level's map as a file of another program.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::args::{ExportCommand, ExportFormat};
+use super::{CommandError, say};
+use crate::clock::SystemClock;
+use crate::config::Config;
+use crate::exchange::geojson;
+use crate::exchange::nav2::{IMAGE_NAME, Nav2Map};
+use crate::level::{LevelOptions, Levels, Snapshot};
+use crate::running::open_store;
+
+/// How long the rest of the log may take to be folded.
+const PATIENCE: Duration = Duration::from_mins(10);
+
+pub(super) async fn run(
+    config: &Config,
+    command: &ExportCommand,
+) -> Result<ExitCode, CommandError> {
+    let store = open_store(config).await?;
+    let clock = Arc::new(SystemClock::start());
+    let levels = Levels::new(store.clone(), clock, LevelOptions::default());
+    let opened = levels.open(&command.site, &command.level).await?;
+    let (site, name) = (&command.site, &command.level);
+    let level = opened
+        .ok_or_else(|| CommandError::Refused(format!("there is no level {site:?}/{name:?}")))?;
+    let newest = level.snapshot().revision();
+    let snapshot = level.snapshot_at(newest, PATIENCE).await;
+    let written = write(&snapshot, command);
+    drop((level, snapshot));
+    levels.shutdown().await;
+    store.close().await;
+    written
+}
+
+fn write(snapshot: &Snapshot, command: &ExportCommand) -> Result<ExitCode, CommandError> {
+    let map = snapshot.map();
+    match command.format {
+        ExportFormat::Geojson => {
+            to_file(&command.out, |file| geojson::write_map(&map, file))?;
+        }
+        ExportFormat::Nav2 => {
+            let nav2 = Nav2Map::new(&map, snapshot.resolution_m())
+                .map_err(|error| CommandError::Refused(error.to_string()))?;
+            to_file(&command.out.with_file_name(IMAGE_NAME), |file| nav2.write_pgm(file))?;
+            to_file(&command.out, |file| file.write_all(nav2.yaml().as_bytes()))?;
+        }
+    }
+    let (path, revision) = (command.out.display(), snapshot.folded_revision());
+    say(&format!("{path} holds revision {revision}"))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Writes a file whole: under another name first, so that nobody ever reads half of it.
+fn to_file(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+) -> Result<(), CommandError> {
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(".partial");
+    let written = (|| {
+        let mut file = BufWriter::new(File::create(&partial)?);
+        write(&mut file)?;
+        file.into_inner().map_err(std::io::IntoInnerError::into_error)?.sync_all()?;
+        std::fs::rename(&partial, path)
+    })();
+    written.map_err(|cause| CommandError::File {
+        what: format!("cannot write {}", path.display()),
+        cause,
+    })
+}

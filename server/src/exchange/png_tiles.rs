@@ -1,0 +1,155 @@
+//! A picture pyramid of the raster: 256 by 256 pixels a picture, on a grid that never moves.
+//!
+//! Zoom level [`ZOOM_NATIVE`] shows one cell as one pixel, each lower level halves that, the two
+//! above magnify without smoothing: `resolution(z) = resolution_m * 2^(6 - z)` metres a pixel.
+//! The grid's origin is the level's: `col = floor(x / (256 * resolution))`,
+//! `row = floor(-y / (256 * resolution))`. Rows grow downwards: row 0 lies just below the x axis,
+//! row -1 just above it. Both may be negative.
+//!
+//! The colours keep their order of brightness in any colour vision: what was never seen is
+//! transparent, free space very light, obstacles dark; what only sonar speaks of has a hue of its
+//! own (orange against blue).
+
+mod cache;
+mod shades;
+
+use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
+use std::sync::Arc;
+
+use mapfold_map::level::LevelMap;
+use mapfold_map::raster::{SensorClass, TILE_SIDE, Tile, TileIndex, TileKey};
+
+pub use cache::{Picture, PictureCache};
+pub use shades::{Shades, Shading};
+
+/// Pixels along a picture's side.
+pub const PICTURE_SIDE: usize = 256;
+/// The zoom level at which one cell is one pixel.
+pub const ZOOM_NATIVE: u8 = 6;
+/// The highest zoom level.
+pub const ZOOM_MAX: u8 = 8;
+
+/// Which evidence a picture shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Layer {
+    /// The sum of all classes.
+    All,
+    /// One class alone.
+    Only(SensorClass),
+}
+
+impl Layer {
+    fn shows(self, class: SensorClass) -> bool {
+        self == Self::All || self == Self::Only(class)
+    }
+}
+
+/// A place in the pyramid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Address {
+    z: u8,
+    row: i32,
+    col: i32,
+}
+
+/// Where tiles are: a map, or what a level publishes.
+pub trait Tiles {
+    /// All tiles from `first` to `last`, ascending.
+    fn between(
+        &self,
+        first: TileKey,
+        last: TileKey,
+    ) -> Box<dyn Iterator<Item = (&TileKey, &Arc<Tile>)> + '_>;
+}
+
+impl Tiles for LevelMap {
+    fn between(
+        &self,
+        first: TileKey,
+        last: TileKey,
+    ) -> Box<dyn Iterator<Item = (&TileKey, &Arc<Tile>)> + '_> {
+        Box::new(self.tiles.range(first..=last))
+    }
+}
+
+/// The tiles of one place: its layers that are shown, in the canonical order of classes.
+pub type Layers<'a> = Vec<(SensorClass, &'a Arc<Tile>)>;
+
+impl Address {
+    /// The picture at zoom level `z`; `None` beyond [`ZOOM_MAX`].
+    pub fn new(z: u8, row: i32, col: i32) -> Option<Self> {
+        (z <= ZOOM_MAX).then_some(Self { z, row, col })
+    }
+
+    /// Map tiles along the picture's side: 256 at zoom level 0, 1 at 8.
+    fn tiles_along(self) -> i64 {
+        1 << (ZOOM_MAX - self.z)
+    }
+
+    /// The map tiles across and up that the picture shows; `None` where no tile can be.
+    fn tiles(self) -> Option<(RangeInclusive<i32>, RangeInclusive<i32>)> {
+        let along = self.tiles_along();
+        let span = |first: i64| {
+            let first_tile = i32::try_from(first).ok()?;
+            let last_tile = i32::try_from(first + along - 1).ok()?;
+            Some(first_tile..=last_tile)
+        };
+        Some((span(i64::from(self.col) * along)?, span((-i64::from(self.row) - 1) * along)?))
+    }
+
+    /// What `map` holds of `layer` in this picture. Costs a search per column of map tiles,
+    /// however large the map.
+    pub fn select(self, map: &impl Tiles, layer: Layer) -> BTreeMap<TileIndex, Layers<'_>> {
+        let mut found: BTreeMap<TileIndex, Layers> = BTreeMap::new();
+        let Some((xs, ys)) = self.tiles() else { return found };
+        for class in SensorClass::ALL.into_iter().filter(|class| layer.shows(*class)) {
+            for x in xs.clone() {
+                let key = |y: i32| TileKey { class, tile: TileIndex { x, y } };
+                for (key, tile) in map.between(key(*ys.start()), key(*ys.end())) {
+                    found.entry(key.tile).or_default().push((class, tile));
+                }
+            }
+        }
+        found
+    }
+
+    /// Draws the picture from the shades of its tiles.
+    ///
+    /// # Errors
+    /// A fault of the encoder.
+    pub fn draw<'a>(
+        self,
+        tiles: impl IntoIterator<Item = (TileIndex, &'a Shades)>,
+    ) -> Result<Vec<u8>, png::EncodingError> {
+        let mut pixels = vec![0_u8; PICTURE_SIDE * PICTURE_SIDE];
+        let block = PICTURE_SIDE >> (ZOOM_MAX - self.z);
+        if let Some((xs, ys)) = self.tiles() {
+            for (tile, shades) in tiles {
+                if xs.contains(&tile.x) && ys.contains(&tile.y) {
+                    let left = tile.x.abs_diff(*xs.start()) as usize * block;
+                    let top = ys.end().abs_diff(tile.y) as usize * block;
+                    paste(&mut pixels, left, top, block, shades);
+                }
+            }
+        }
+        shades::encode(&pixels)
+    }
+}
+
+/// Copies a tile into a block of the picture, upside down as a picture's rows run downwards.
+fn paste(pixels: &mut [u8], left: usize, top: usize, block: usize, shades: &Shades) {
+    let side = block.min(TILE_SIDE);
+    let magnified = block / side;
+    let level = shades.at_side(side);
+    for down in 0..block {
+        let row = side - 1 - down / magnified;
+        let start = (top + down) * PICTURE_SIDE + left;
+        for (across, pixel) in pixels[start..start + block].iter_mut().enumerate() {
+            *pixel = level[row * side + across / magnified];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,42 @@
+//! The HTTP side: who asks for what, and in which words the answer goes out. The only part that
+//! knows statuses, headers and media types; it decides nothing about maps.
+//!
+//! * `router`: the whole API on one screen, and `openapi`, its description.
+//! * `layers`: what every request passes before and after its handler, in an order that matters.
+//! * `listen`: the accept loop.
+//! * `problem`: every error and the problem that it becomes.
+//! * `access`, `body`, `query`, `answer`: what handlers take in and give out.
+//! * One file per resource, with thin handlers.
+
+mod access;
+mod answer;
+mod body;
+mod check;
+mod layers;
+mod listen;
+mod observe;
+mod openapi;
+mod problem;
+mod query;
+mod router;
+mod state;
+
+mod contributions;
+mod docs;
+mod events;
+mod exports;
+mod health;
+mod levels;
+mod page;
+mod patches;
+mod raster;
+mod robots;
+mod session;
+mod sites;
+mod tiles;
+mod vector;
+
+pub use listen::serve;
+pub use openapi::openapi;
+pub use router::router;
+pub use state::{App, Parts};

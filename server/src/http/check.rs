@@ -1,0 +1,159 @@
+//! What people set up, checked before it is stored: slugs, names, figures.
+
+use mapfold_schema::border::Violation;
+use mapfold_schema::slug::{SLUG_LENGTH_MAX, is_slug};
+use mapfold_schema::v1::{NewLevel, NewRobot, NewSite, RobotUpdate, Scope, SensorProfile};
+
+use super::problem::ApiError;
+
+/// Longest name for people, bytes.
+const NAME_LENGTH_MAX: usize = 128;
+/// Sensors of one robot.
+const SENSORS_MAX: usize = 32;
+/// Edge of a cell: from half a centimetre to a metre.
+const RESOLUTION_M: std::ops::RangeInclusive<f64> = 0.005..=1.0;
+/// Height of a floor over some datum.
+const ELEVATION_MAX_M: f64 = 10_000.0;
+/// Ranges of a sensor.
+const RANGE_MAX_M: f64 = 10_000.0;
+/// What a robot's token may allow: never what operators do.
+const ROBOT_SCOPES: [Scope; 2] = [Scope::MapRead, Scope::MapContribute];
+
+#[derive(Default)]
+struct Findings(Vec<Violation>);
+
+impl Findings {
+    fn expect(&mut self, fine: bool, pointer: &str, code: &str, detail: impl Into<String>) {
+        if !fine {
+            let (pointer, code) = (pointer.to_owned(), code.to_owned());
+            self.0.push(Violation { pointer, code, detail: detail.into() });
+        }
+    }
+
+    fn slug(&mut self, text: &str, pointer: &str) {
+        let detail = format!(
+            "a slug is 1 to {SLUG_LENGTH_MAX} lower-case letters, digits and inner hyphens"
+        );
+        self.expect(is_slug(text), pointer, "not_a_slug", detail);
+    }
+
+    fn name(&mut self, name: Option<&str>) {
+        let fits = |name: &str| {
+            !name.trim().is_empty()
+                && name.len() <= NAME_LENGTH_MAX
+                && !name.chars().any(char::is_control)
+        };
+        let detail = format!("a name is 1 to {NAME_LENGTH_MAX} bytes without control characters");
+        self.expect(name.is_none_or(fits), "/name", "bad_name", detail);
+    }
+
+    fn sensors(&mut self, sensors: &[SensorProfile]) {
+        let detail = format!("a robot has at most {SENSORS_MAX} sensors");
+        self.expect(sensors.len() <= SENSORS_MAX, "/sensors", "too_many", detail);
+        for (index, sensor) in sensors.iter().take(SENSORS_MAX).enumerate() {
+            let at = |field: &str| format!("/sensors/{index}/{field}");
+            let within = |value: f64, max: f64| value > 0.0 && value <= max;
+            let lengths = format!("a length of more than 0 and at most {RANGE_MAX_M} m");
+            let range = within(sensor.range_max_m, RANGE_MAX_M);
+            self.expect(range, &at("range_max_m"), "out_of_range", lengths.clone());
+            let sd = within(sensor.range_sd_m, RANGE_MAX_M);
+            self.expect(sd, &at("range_sd_m"), "out_of_range", lengths);
+            let beam = within(sensor.beam_rad, std::f64::consts::TAU);
+            let angle = "an angle of more than 0 and at most 2 pi";
+            self.expect(beam, &at("beam_rad"), "out_of_range", angle);
+            let model = sensor.model.len() <= NAME_LENGTH_MAX
+                && !sensor.model.chars().any(char::is_control);
+            let detail = format!("at most {NAME_LENGTH_MAX} bytes without control characters");
+            self.expect(model, &at("model"), "bad_name", detail);
+        }
+    }
+
+    fn done(self) -> Result<(), ApiError> {
+        if self.0.is_empty() { Ok(()) } else { Err(ApiError::Invalid(self.0)) }
+    }
+}
+
+/// A site to be made.
+pub(super) fn new_site(new: &NewSite) -> Result<(), ApiError> {
+    let mut findings = Findings::default();
+    findings.slug(&new.site, "/site");
+    findings.name(new.name.as_deref());
+    findings.done()
+}
+
+/// A level to be made.
+pub(super) fn new_level(new: &NewLevel) -> Result<(), ApiError> {
+    let mut findings = Findings::default();
+    findings.slug(&new.level, "/level");
+    findings.name(new.name.as_deref());
+    let (low, high) = (RESOLUTION_M.start(), RESOLUTION_M.end());
+    let fine = new.resolution_m.is_none_or(|r| RESOLUTION_M.contains(&r));
+    let detail = format!("the edge of a cell is {low} to {high} m");
+    findings.expect(fine, "/resolution_m", "out_of_range", detail);
+    let fine = new.elevation_m.is_none_or(|e| e.abs() <= ELEVATION_MAX_M);
+    let detail = format!("a floor lies at most {ELEVATION_MAX_M} m above or below");
+    findings.expect(fine, "/elevation_m", "out_of_range", detail);
+    findings.done()
+}
+
+/// A robot to be enrolled.
+pub(super) fn new_robot(new: &NewRobot) -> Result<(), ApiError> {
+    let mut findings = Findings::default();
+    findings.slug(&new.robot, "/robot");
+    findings.name(new.name.as_deref());
+    findings.sensors(&new.sensors);
+    findings.done()
+}
+
+/// A change to a robot.
+pub(super) fn robot_update(update: &RobotUpdate) -> Result<(), ApiError> {
+    let mut findings = Findings::default();
+    findings.name(update.name.as_deref());
+    findings.sensors(update.sensors.as_deref().unwrap_or_default());
+    for (pointer, figure) in
+        [("/revision", update.revision), ("/queue_length", update.queue_length)]
+    {
+        let fine = figure.is_none_or(|f| f >= 0);
+        findings.expect(fine, pointer, "out_of_range", "a whole number, 0 or more");
+    }
+    findings.done()
+}
+
+/// The scopes of a robot's token; reading and contributing if none are named.
+pub(super) fn robot_scopes(scopes: Option<Vec<Scope>>) -> Result<Vec<Scope>, ApiError> {
+    let scopes = scopes.unwrap_or_else(|| ROBOT_SCOPES.to_vec());
+    let mut findings = Findings::default();
+    let fine = !scopes.is_empty() && scopes.iter().all(|scope| ROBOT_SCOPES.contains(scope));
+    let detail = "a robot's token allows map:read, map:contribute or both";
+    findings.expect(fine, "/scopes", "scope_not_for_robots", detail);
+    findings.done().map(|()| scopes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pointers(result: Result<(), ApiError>) -> Vec<String> {
+        match result {
+            Err(ApiError::Invalid(errors)) => errors.into_iter().map(|e| e.pointer).collect(),
+            _ => Vec::new(),
+        }
+    }
+
+    #[test]
+    fn every_bad_field_is_named() {
+        let level = NewLevel {
+            level: "Ground Floor".to_owned(),
+            name: Some("\u{1b}[2J".to_owned()),
+            resolution_m: Some(f64::NAN),
+            elevation_m: Some(1e9),
+        };
+        let expected = ["/level", "/name", "/resolution_m", "/elevation_m"];
+        assert_eq!(pointers(new_level(&level)), expected);
+        assert!(robot_scopes(Some(vec![Scope::MapRead, Scope::Admin])).is_err());
+        assert!(robot_scopes(Some(Vec::new())).is_err());
+        assert_eq!(robot_scopes(None).ok(), Some(ROBOT_SCOPES.to_vec()));
+        let update = RobotUpdate { queue_length: Some(-1), ..RobotUpdate::default() };
+        assert_eq!(pointers(robot_update(&update)), ["/queue_length"]);
+    }
+}

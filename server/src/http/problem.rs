@@ -1,0 +1,318 @@
+//! Every error of the HTTP side, and the problem (RFC 9457) that it becomes. The only place that
+//! knows which error is which status.
+
+use std::sync::Arc;
+
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use mapfold_schema::border::Violation;
+use mapfold_schema::codec::{DecodeError, EncodeError};
+use mapfold_schema::problem::Problem;
+use mapfold_schema::v1::Scope;
+
+use crate::exchange::nav2::Nav2Error;
+use crate::level::{LevelError, SinceError, SubmitError};
+use crate::store::StoreError;
+use crate::store::payload::PayloadError;
+
+/// Why a request is refused.
+#[derive(Debug)]
+pub(super) enum ApiError {
+    /// No such path.
+    NoRoute,
+    /// A path, but not with this method.
+    WrongMethod,
+    /// No token, or (if one was `presented`) not a valid one.
+    Unauthenticated { presented: bool },
+    /// The token does not allow this.
+    MissingScope(Scope),
+    /// The token speaks for another robot.
+    OtherRobot { own: String },
+    /// A request with a session's cookie that another page may have sent.
+    ForeignOrigin,
+    /// Something that the path names is not there.
+    NotFound { kind: &'static str, name: String },
+    /// The query does not fit.
+    Query(String),
+    /// None of what is offered is accepted.
+    NotAcceptable(&'static str),
+    /// The body could not be read in time.
+    BodyTimeout,
+    /// The body is too large.
+    BodyTooLarge { limit_bytes: usize },
+    /// Too many items in one body.
+    TooManyItems { limit: usize },
+    /// The body broke off or cannot be unpacked.
+    BodyBroken,
+    /// The body is not of a known type, or cannot be read.
+    Body(DecodeError),
+    /// The body can be read, but not taken.
+    Invalid(Vec<Violation>),
+    /// The contribution can be read, but not taken.
+    InvalidContribution(Vec<Violation>),
+    /// As many live streams as there may be.
+    StreamsExhausted,
+    /// As many requests as there may be.
+    Overloaded,
+    /// The server is about to stop.
+    Closing,
+    /// A contribution was not acknowledged.
+    Submit(SubmitError),
+    /// A revision that the map has not reached.
+    Since(SinceError),
+    /// A level cannot be opened.
+    Level(LevelError),
+    /// The store failed.
+    Store(StoreError),
+    /// There is no image of this map.
+    Nav2(Nav2Error),
+    /// A fault of ours.
+    Internal(String),
+}
+
+impl From<StoreError> for ApiError {
+    fn from(error: StoreError) -> Self {
+        Self::Store(error)
+    }
+}
+
+impl From<LevelError> for ApiError {
+    fn from(error: LevelError) -> Self {
+        Self::Level(error)
+    }
+}
+
+impl From<SinceError> for ApiError {
+    fn from(error: SinceError) -> Self {
+        Self::Since(error)
+    }
+}
+
+impl From<EncodeError> for ApiError {
+    fn from(error: EncodeError) -> Self {
+        Self::Internal(error.to_string())
+    }
+}
+
+impl From<PayloadError> for ApiError {
+    fn from(error: PayloadError) -> Self {
+        Self::Internal(error.to_string())
+    }
+}
+
+impl ApiError {
+    /// Something that the path names is not there.
+    pub(super) fn not_found(kind: &'static str, name: impl Into<String>) -> Self {
+        Self::NotFound { kind, name: name.into() }
+    }
+
+    /// The problem that the client gets.
+    pub(super) fn problem(&self) -> Problem {
+        match self {
+            Self::NoRoute => of(404, "not_found", "There is nothing at this path; see /docs."),
+            Self::WrongMethod => {
+                of(405, "method_not_allowed", "This path does not take this method; see `Allow`.")
+            }
+            Self::Unauthenticated { presented: false } => {
+                of(401, "unauthenticated", "Send a token as `Authorization: Bearer`, or sign in.")
+            }
+            Self::Unauthenticated { presented: true } => {
+                of(401, "invalid_token", "The token is unknown, has ended or was revoked.")
+            }
+            Self::MissingScope(scope) => of(
+                403,
+                "insufficient_scope",
+                format!("The token lacks the scope {}.", word(*scope)),
+            ),
+            Self::OtherRobot { own } => {
+                of(403, "other_robot", format!("The token speaks for the robot {own:?} only."))
+            }
+            Self::ForeignOrigin => of(
+                403,
+                "foreign_origin",
+                "A request with a session's cookie must come from this server's own page.",
+            ),
+            Self::NotFound { kind, name } => missing(kind, name),
+            Self::Query(detail) => of(400, "query_invalid", detail),
+            Self::NotAcceptable(offered) => {
+                of(406, "not_acceptable", format!("What can be had here is {offered}."))
+            }
+            Self::BodyTimeout => of(408, "body_timeout", "The body did not arrive in time."),
+            Self::BodyTooLarge { limit_bytes } => of(
+                413,
+                "body_too_large",
+                format!(
+                    "A body may have {limit_bytes} bytes here once unpacked; send less at once."
+                ),
+            ),
+            Self::TooManyItems { limit } => {
+                of(413, "too_many_items", format!("One body may hold {limit} of these."))
+            }
+            Self::BodyBroken => {
+                of(400, "body_broken", "The body broke off, or its content coding is damaged.")
+            }
+            Self::Body(error) => unreadable(error),
+            Self::Invalid(errors) => {
+                invalid("body_invalid", "Some fields of the body cannot be taken.", errors)
+            }
+            Self::InvalidContribution(errors) => {
+                let detail = "Nothing of it was taken; `errors` names what is wrong.";
+                invalid("contribution_invalid", detail, errors)
+            }
+            Self::StreamsExhausted => {
+                of(429, "streams_exhausted", "As many live streams as there may be are open.")
+            }
+            Self::Overloaded => of(503, "overloaded", "Too many requests at once."),
+            Self::Closing => of(503, "closing", "The server is about to stop."),
+            Self::Submit(error) => unacknowledged(error),
+            Self::Since(error) => ahead(error),
+            Self::Level(LevelError::Closing) => Self::Closing.problem(),
+            Self::Level(LevelError::Store(error)) | Self::Store(error) => of_store(error),
+            Self::Nav2(error) => {
+                let code = match error {
+                    Nav2Error::Empty => "map_empty",
+                    Nav2Error::TooLarge { .. } => "map_too_large",
+                };
+                of(409, code, error.to_string())
+            }
+            Self::Internal(_) => of(500, "internal", "The server is at fault; its log says more."),
+        }
+    }
+
+    /// What the server's own log says, where the client is told less.
+    fn cause(&self) -> Option<String> {
+        match self {
+            Self::Internal(cause) => Some(cause.clone()),
+            Self::Level(error) => Some(error.to_string()),
+            Self::Store(error) => Some(error.to_string()),
+            Self::Submit(error) => Some(error.to_string()),
+            _ => None,
+        }
+    }
+}
+
+/// A problem of the kind `code`, with the kind in words from its name.
+fn of(status: u16, code: &str, detail: impl Into<String>) -> Problem {
+    let mut title = code.replace('_', " ");
+    title[..1].make_ascii_uppercase();
+    Problem::new(status, code, &title, detail)
+}
+
+fn invalid(code: &str, detail: &str, errors: &[Violation]) -> Problem {
+    Problem { errors: errors.to_vec(), ..of(422, code, detail) }
+}
+
+fn missing(kind: &str, name: &str) -> Problem {
+    let advice = match kind {
+        "robot" => " Enrol it first: POST to the site's robots.",
+        "site" | "level" => " Create it first, or use a token that reaches it.",
+        _ => "",
+    };
+    let code = format!("{}_not_found", kind.replace(' ', "_"));
+    of(404, &code, format!("There is no {kind} {name:?} here.{advice}"))
+}
+
+fn unreadable(error: &DecodeError) -> Problem {
+    match error {
+        DecodeError::MediaType(_) => of(415, "unsupported_media_type", error.to_string()),
+        DecodeError::Json(_) | DecodeError::Cbor(_) => of(400, "body_malformed", error.to_string()),
+        DecodeError::Shape(violation) => {
+            invalid("body_invalid", &error.to_string(), std::slice::from_ref(violation))
+        }
+    }
+}
+
+fn unacknowledged(error: &SubmitError) -> Problem {
+    match error {
+        SubmitError::QueueFull { .. } => of(503, "queue_full", error.to_string()),
+        SubmitError::Conflict { .. } => of(409, "contribution_conflict", error.to_string()),
+        SubmitError::UnknownRobot { robot } => missing("robot", robot),
+        SubmitError::DiskFull => of(507, "storage_full", error.to_string()),
+        SubmitError::Unavailable(_) => {
+            of(503, "unavailable", "The log cannot be written now; sending it again is safe.")
+        }
+    }
+}
+
+fn ahead(error: &SinceError) -> Problem {
+    if error.since < 0 {
+        of(400, "query_invalid", "`since` is a revision: 0 or more.")
+    } else if error.since <= error.revision {
+        of(503, "revision_not_reached", error.to_string())
+    } else {
+        let detail = format!("{error}: forget what you have and read again from revision 0.");
+        of(410, "cursor_expired", detail)
+    }
+}
+
+fn of_store(error: &StoreError) -> Problem {
+    match error {
+        StoreError::AlreadyExists { kind, name } => {
+            of(409, &format!("{kind}_exists"), format!("There is a {kind} {name:?} already."))
+        }
+        StoreError::Missing { kind, name } => missing(kind, name),
+        StoreError::DiskFull => of(507, "storage_full", error.to_string()),
+        StoreError::ReadOnly | StoreError::Unavailable(_) => {
+            of(503, "unavailable", "The database does not answer, or takes no changes, now.")
+        }
+        _ => ApiError::Internal(String::new()).problem(),
+    }
+}
+
+/// The database does not answer a health check.
+pub(super) fn not_ready() -> Problem {
+    of(503, "unavailable", "The database does not answer.")
+}
+
+/// The scope as tokens name it.
+pub(super) fn word(scope: Scope) -> &'static str {
+    match scope {
+        Scope::MapRead => "map:read",
+        Scope::MapContribute => "map:contribute",
+        Scope::MapEdit => "map:edit",
+        Scope::MapPublish => "map:publish",
+        Scope::Admin => "admin",
+    }
+}
+
+/// A problem on its way out; [`super::layers`] writes it, with the request's id.
+#[derive(Debug, Clone)]
+pub(super) struct Outgoing(pub(super) Arc<Problem>);
+
+impl IntoResponse for ApiError {
+    fn into_response(self) -> Response {
+        let problem = self.problem();
+        if let Some(cause) = self.cause().filter(|_| problem.status >= 500) {
+            tracing::error!(code = problem.code, cause, "request failed");
+        }
+        respond(problem)
+    }
+}
+
+/// An answer that bears a problem.
+pub(super) fn respond(problem: Problem) -> Response {
+    let status = StatusCode::from_u16(problem.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+    let mut response = status.into_response();
+    response.extensions_mut().insert(Outgoing(Arc::new(problem)));
+    response
+}
+
+/// The problem of an answer that a layer gave with nothing but a status.
+pub(super) fn of_status(status: StatusCode, limit_bytes: usize) -> Problem {
+    match status {
+        StatusCode::NOT_FOUND => ApiError::NoRoute.problem(),
+        StatusCode::METHOD_NOT_ALLOWED => ApiError::WrongMethod.problem(),
+        StatusCode::REQUEST_TIMEOUT => ApiError::BodyTimeout.problem(),
+        StatusCode::PAYLOAD_TOO_LARGE => ApiError::BodyTooLarge { limit_bytes }.problem(),
+        StatusCode::UNSUPPORTED_MEDIA_TYPE => {
+            of(415, "unsupported_coding", "A body may be coded as gzip or zstd, once.")
+        }
+        StatusCode::NOT_ACCEPTABLE => ApiError::NotAcceptable("no other content coding").problem(),
+        StatusCode::GATEWAY_TIMEOUT => of(504, "timeout", "The answer took too long; try again."),
+        StatusCode::SERVICE_UNAVAILABLE => ApiError::Overloaded.problem(),
+        other if other.is_client_error() => {
+            of(other.as_u16(), "refused", "The request cannot be understood.")
+        }
+        _ => ApiError::Internal(String::new()).problem(),
+    }
+}

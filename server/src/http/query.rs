@@ -1,0 +1,73 @@
+//! The part of a URL behind the question mark, and typed parts of its path.
+
+use axum::extract::rejection::QueryRejection;
+use axum::extract::{FromRequestParts, Query};
+use axum::http::request::Parts;
+use mapfold_schema::v1::Bounds;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Deserializer};
+
+use super::problem::ApiError;
+
+/// A query of known fields; anything else is refused by name.
+pub(super) struct QueryOf<T>(pub(super) T);
+
+impl<S: Send + Sync, T: DeserializeOwned + Send> FromRequestParts<S> for QueryOf<T> {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+        match Query::from_request_parts(parts, state).await {
+            Ok(Query(query)) => Ok(Self(query)),
+            Err(QueryRejection::FailedToDeserializeQueryString(error)) => {
+                Err(ApiError::Query(format!("The query does not fit: {}.", error.body_text())))
+            }
+            Err(_) => Err(ApiError::Query("The query cannot be read.".to_owned())),
+        }
+    }
+}
+
+/// `since` and `bbox`, as all reads of the map take them.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(super) struct SinceInBox {
+    /// Only what changed after this revision; 0 gives all.
+    #[serde(default)]
+    pub(super) since: i64,
+    /// Only what touches this rectangle: `min_x,min_y,max_x,max_y` in metres.
+    #[serde(default, deserialize_with = "bbox")]
+    #[param(value_type = Option<String>)]
+    pub(super) bbox: Option<Bounds>,
+}
+
+/// `min_x,min_y,max_x,max_y` in metres.
+pub(super) fn bbox<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Bounds>, D::Error> {
+    let text = String::deserialize(from)?;
+    parse_bbox(&text).map(Some).ok_or_else(|| {
+        serde::de::Error::custom(
+            "bbox is four numbers, min_x,min_y,max_x,max_y in metres, the minima not above the maxima",
+        )
+    })
+}
+
+fn parse_bbox(text: &str) -> Option<Bounds> {
+    let numbers: Vec<f64> = text.split(',').map(str::parse).collect::<Result<_, _>>().ok()?;
+    let [min_x_m, min_y_m, max_x_m, max_y_m] = numbers[..] else { return None };
+    let ordered = min_x_m <= max_x_m && min_y_m <= max_y_m;
+    let finite = numbers.iter().all(|n| n.is_finite());
+    (ordered && finite).then_some(Bounds { min_x_m, min_y_m, max_x_m, max_y_m })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bbox_is_four_finite_numbers_in_order() {
+        let bounds = Bounds { min_x_m: -1.0, min_y_m: 2.5, max_x_m: 3.0, max_y_m: 4.0 };
+        assert_eq!(parse_bbox("-1,2.5,3,4"), Some(bounds));
+        for bad in ["", "1,2,3", "1,2,3,4,5", "3,0,1,1", "0,0,NaN,1", "0,0,inf,1", "a,b,c,d"] {
+            assert_eq!(parse_bbox(bad), None, "{bad:?}");
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! `L/raster`: which tiles changed, and one tile's evidence.
+
+use axum::extract::Path;
+use axum::response::Response;
+use mapfold_map::raster::{TILE_CELLS, TileIndex, TileKey};
+use mapfold_schema::v1::{RasterChanges, SensorClass};
+use mapfold_schema::{codec, route};
+use serde::Deserialize;
+
+use super::access::{LevelFor, Read};
+use super::answer::{DATA, Reader};
+use super::problem::ApiError;
+use super::query::{QueryOf, SinceInBox};
+
+const BINARY: &str = "application/octet-stream";
+
+/// Which tiles changed after `since`, of all layers.
+#[utoipa::path(
+    get, path = route::RASTER, operation_id = "read_raster_changes", tag = "map",
+    params(("site" = String, Path), ("level" = String, Path), SinceInBox),
+    responses(
+        (status = 200, content(
+            (RasterChanges = "application/json"),
+            (RasterChanges = "application/cbor"),
+        )),
+        (status = 410, description = "`cursor_expired`: `since` is ahead of the log; read from 0"),
+    )
+)]
+pub(super) async fn changes(
+    level: LevelFor<Read>,
+    QueryOf(query): QueryOf<SinceInBox>,
+    reader: Reader,
+) -> Result<Response, ApiError> {
+    let media_type = reader.choose(DATA)?;
+    let snapshot = level.snapshot_since(query.since).await?;
+    let revision = snapshot.folded_revision();
+    let write = move || {
+        let changes = snapshot.raster_since(query.since, query.bbox.as_ref())?;
+        Ok(codec::encode(media_type, &changes)?)
+    };
+    reader.of_revision(level.level.frame(), revision, media_type, write).await
+}
+
+/// Which layer of a tile is asked for.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(super) struct TileQuery {
+    /// The class of sensors; the sum of all if absent.
+    #[param(inline)]
+    sensor: Option<SensorClass>,
+}
+
+/// One tile's evidence: 64 x 64 cells, row by row from below, each a little-endian `i32` of
+/// log-odds in 0.01 nat, not clamped. A tile without evidence is not found.
+#[utoipa::path(
+    get, path = route::RASTER_TILE, operation_id = "read_raster_tile", tag = "map",
+    params(
+        ("site" = String, Path), ("level" = String, Path),
+        ("x" = i32, Path, description = "Tiles to the right of the level's origin"),
+        ("y" = i32, Path, description = "Tiles up from the level's origin"),
+        TileQuery,
+    ),
+    responses(
+        (status = 200, content_type = "application/octet-stream", body = [u8]),
+        (status = 404, description = "`tile_not_found`: no evidence there"),
+    )
+)]
+pub(super) async fn tile(
+    level: LevelFor<Read>,
+    Path((_, _, x, y)): Path<(String, String, String, String)>,
+    QueryOf(query): QueryOf<TileQuery>,
+    reader: Reader,
+) -> Result<Response, ApiError> {
+    let media_type = reader.choose(&[BINARY])?;
+    let missing = || ApiError::not_found("tile", format!("{x}/{y}"));
+    let (Ok(x_index), Ok(y_index)) = (x.parse(), y.parse()) else { return Err(missing()) };
+    let tile = TileIndex { x: x_index, y: y_index };
+    let snapshot = level.level.snapshot();
+    let asked_for = |class| query.sensor.is_none_or(|asked| asked == SensorClass::from(class));
+    let mut sums = vec![0_i32; TILE_CELLS];
+    let mut found = false;
+    for class in mapfold_map::raster::SensorClass::ALL.into_iter().filter(|c| asked_for(*c)) {
+        if let Some((_, layer)) = snapshot.tile(&TileKey { class, tile }) {
+            found = true;
+            for (sum, cell) in sums.iter_mut().zip(layer.cells()) {
+                *sum = sum.wrapping_add(*cell);
+            }
+        }
+    }
+    if !found {
+        return Err(missing());
+    }
+    let bytes: Vec<u8> = sums.iter().flat_map(|sum| sum.to_le_bytes()).collect();
+    let tag = super::answer::Tag::of_bytes(&bytes);
+    Ok(reader.bytes(media_type, &tag, || bytes))
+}

@@ -1,0 +1,55 @@
+//! The whole API on one screen.
+
+use axum::Router;
+use axum::extract::DefaultBodyLimit;
+use axum::routing::{get, post};
+use mapfold_schema::route;
+
+use super::problem::ApiError;
+use super::state::App;
+use super::{
+    contributions, docs, events, exports, health, layers, levels, page, patches, raster, robots,
+    session, sites, tiles, vector,
+};
+
+/// All routes, with all layers around them.
+pub fn router(app: &App) -> Router {
+    let upload_bytes = app.parts.limits.upload_bytes;
+    let routes = Router::new()
+        .route(route::SITES, get(sites::list).post(sites::create))
+        .route(route::LEVELS, get(levels::list).post(levels::create))
+        .route(route::LEVEL, get(levels::describe))
+        .route(route::ROBOTS, get(robots::list).post(robots::enrol))
+        .route(route::ROBOT, get(robots::describe).patch(robots::update))
+        .route(route::ROBOT_TOKENS, post(robots::issue_token))
+        .route(
+            route::CONTRIBUTIONS,
+            get(contributions::list)
+                .post(contributions::upload)
+                .layer(DefaultBodyLimit::max(upload_bytes)),
+        )
+        .route(route::CONTRIBUTION, get(contributions::describe))
+        .route(route::VECTOR, get(vector::read))
+        .route(route::RASTER, get(raster::changes))
+        .route(route::RASTER_TILE, get(raster::tile))
+        .route(route::TILES, get(tiles::read))
+        .route(route::PATCHES, get(patches::read))
+        .route(route::EVENTS, get(events::follow))
+        .route(route::EXPORTS, get(exports::read))
+        .route(
+            route::SESSION,
+            get(session::describe).post(session::sign_in).delete(session::sign_out),
+        )
+        .route("/livez", get(health::live))
+        .route("/readyz", get(health::ready))
+        .route("/metrics", get(health::metrics))
+        .route(docs::DESCRIPTION, get(docs::description))
+        .route("/docs", get(docs::redirect))
+        .route("/docs/", get(docs::index))
+        .route("/docs/{*path}", get(docs::asset))
+        .route("/", get(page::index))
+        .fallback(page::asset)
+        .method_not_allowed_fallback(async || ApiError::WrongMethod)
+        .with_state(app.clone());
+    layers::around(routes, app)
+}
