@@ -1,0 +1,226 @@
+//! Levels in memory: one owning task per level, its queue, its fold, and what it publishes.
+//!
+//! A contribution is *accepted* (checked and encoded, by the caller), *appended* to the log
+//! together with whatever else is waiting, acknowledged, *folded*, *published* as a new
+//! [`Snapshot`] and *written behind*. Memory is a cache of the store, never the reverse: whatever
+//! fails here, the level is dropped and read back. Knows the store and the map, not HTTP.
+
+mod accept;
+mod append;
+mod fold;
+pub(crate) mod folding;
+mod history;
+mod open;
+pub(crate) mod recall;
+mod registry;
+pub(crate) mod rows;
+mod since;
+mod snapshot;
+mod write_behind;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
+use std::time::Duration;
+
+use mapfold_map::raster::TILE_SIDE;
+use mapfold_schema::border::{Limits, Target};
+use mapfold_schema::v1;
+use tokio::sync::{Notify, broadcast, mpsc, oneshot, watch};
+use uuid::Uuid;
+
+pub use accept::Accepted;
+pub use registry::{LevelError, LevelOptions, Levels};
+pub use since::SinceError;
+pub use snapshot::Snapshot;
+
+use crate::store::levels::LevelRow;
+use append::Waiting;
+
+/// Why a contribution was not acknowledged. Nothing of it is in the log then, except after
+/// [`SubmitError::Unavailable`], which leaves that open: sending it again is safe and tells.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum SubmitError {
+    /// Too many contributions wait for this level; try again in a second or two.
+    #[error("the queue of level {level:?} is full ({capacity} contributions)")]
+    QueueFull {
+        /// Slug of the level.
+        level: String,
+        /// How many may wait.
+        capacity: usize,
+    },
+    /// The id stands in the log with other content.
+    #[error("contribution {id} is in the log already, as revision {revision}, with other content")]
+    Conflict {
+        /// The contribution.
+        id: Uuid,
+        /// Where the other content stands.
+        revision: i64,
+    },
+    /// The robot is not enrolled on the site.
+    #[error("robot {robot:?} is not enrolled")]
+    UnknownRobot {
+        /// Its slug.
+        robot: String,
+    },
+    /// No space is left for the log.
+    #[error("the disk of the database is full")]
+    DiskFull,
+    /// The store did not answer, or the level is closing.
+    #[error("the log cannot be written at the moment: {0}")]
+    Unavailable(String),
+}
+
+/// Which level it is.
+#[derive(Debug, PartialEq, Eq)]
+struct Identity {
+    site: String,
+    level: String,
+}
+
+/// The near end of an open level.
+#[derive(Debug)]
+struct Shared {
+    /// As it was when the level was opened.
+    row: Arc<LevelRow>,
+    capacity: usize,
+    queue: mpsc::Sender<Waiting>,
+    snapshots: watch::Receiver<Arc<Snapshot>>,
+    /// Weak, so that receivers learn of the level's end though handles are held.
+    events: broadcast::WeakSender<v1::LevelEvent>,
+    /// Newest revision of the log that is known here.
+    head: Arc<AtomicI64>,
+    /// Tells the fold to look at the log now.
+    look: Arc<Notify>,
+}
+
+/// An open level. Clones are cheap; as long as one is held the level stays open.
+#[derive(Debug, Clone)]
+pub struct LevelHandle {
+    shared: Arc<Shared>,
+}
+
+impl LevelHandle {
+    /// Slug of its site.
+    pub fn site(&self) -> &str {
+        &self.shared.row.site
+    }
+
+    /// Slug.
+    pub fn level(&self) -> &str {
+        &self.shared.row.level
+    }
+
+    /// UUID of its frame.
+    pub fn frame(&self) -> Uuid {
+        self.shared.row.frame
+    }
+
+    /// Edge of a cell, metres.
+    pub fn resolution_m(&self) -> f64 {
+        self.shared.row.resolution_m
+    }
+
+    /// What a contribution to it is checked against.
+    pub fn target(&self, limits: Limits) -> Target {
+        Target { frame: self.frame(), resolution_m: self.resolution_m(), limits }
+    }
+
+    /// The level in words and figures.
+    pub fn describe(&self) -> v1::LevelDescription {
+        let row = &self.shared.row;
+        let snapshot = self.snapshot();
+        v1::LevelDescription {
+            site: row.site.clone(),
+            level: row.level.clone(),
+            name: row.name.clone(),
+            frame: row.frame,
+            resolution_m: row.resolution_m,
+            tile_cells: TILE_SIDE as u32,
+            elevation_m: row.elevation_m,
+            revision: self.shared.head.load(Ordering::Acquire).max(snapshot.revision()),
+            folded_revision: snapshot.folded_revision(),
+            bounds: snapshot.bounds(),
+            counts: snapshot.counts(),
+            published: None,
+        }
+    }
+
+    /// Hands a contribution in; resolves when it is on disk. The same id and content gets the
+    /// same receipt, however often it is sent.
+    ///
+    /// # Errors
+    /// Why there is no receipt.
+    pub async fn submit(&self, accepted: Accepted) -> Result<v1::Receipt, SubmitError> {
+        match self.submit_many(vec![accepted]).await.pop() {
+            Some(outcome) => outcome,
+            None => Err(self.closing()),
+        }
+    }
+
+    /// Hands several contributions in, each with an answer of its own, in their order. Either all
+    /// of them find a place in the queue or none does.
+    pub async fn submit_many(
+        &self,
+        accepted: Vec<Accepted>,
+    ) -> Vec<Result<v1::Receipt, SubmitError>> {
+        let count = accepted.len();
+        let places = match self.shared.queue.try_reserve_many(count) {
+            Ok(places) => places,
+            Err(mpsc::error::TrySendError::Full(())) => {
+                metrics::counter!("mapfold_contributions_total", "outcome" => "queue_full")
+                    .increment(count as u64);
+                return vec![Err(self.queue_full()); count];
+            }
+            Err(mpsc::error::TrySendError::Closed(())) => return vec![Err(self.closing()); count],
+        };
+        let answers: Vec<oneshot::Receiver<_>> = places
+            .zip(accepted)
+            .map(|(place, accepted)| {
+                let (answer, receiver) = oneshot::channel();
+                place.send(Waiting { accepted, answer });
+                receiver
+            })
+            .collect();
+        let mut outcomes = Vec::with_capacity(count);
+        for answer in answers {
+            outcomes.push(answer.await.unwrap_or_else(|_| Err(self.closing())));
+        }
+        outcomes
+    }
+
+    fn queue_full(&self) -> SubmitError {
+        SubmitError::QueueFull { level: self.level().to_owned(), capacity: self.shared.capacity }
+    }
+
+    fn closing(&self) -> SubmitError {
+        SubmitError::Unavailable(format!("level {:?} is closing", self.level()))
+    }
+
+    /// What is published now.
+    pub fn snapshot(&self) -> Arc<Snapshot> {
+        Arc::clone(&self.shared.snapshots.borrow())
+    }
+
+    /// What is published once it has reached `revision`, or what is published after `patience` if
+    /// it has not: for a reader that another replica has served before.
+    pub async fn snapshot_at(&self, revision: i64, patience: Duration) -> Arc<Snapshot> {
+        let mut snapshots = self.shared.snapshots.clone();
+        if snapshots.borrow().folded_revision() < revision {
+            self.shared.look.notify_one();
+            let reached = snapshots.wait_for(|s| s.folded_revision() >= revision);
+            // Late or closing: what there is, is the answer.
+            let _ = tokio::time::timeout(patience, reached).await;
+        }
+        self.snapshot()
+    }
+
+    /// Events from now on, one for each published snapshot. A receiver that lags by more than
+    /// [`LevelOptions::event_capacity`] is told so and must read again from its revision. It ends
+    /// when the level is closed.
+    pub fn events(&self) -> broadcast::Receiver<v1::LevelEvent> {
+        match self.shared.events.upgrade() {
+            Some(events) => events.subscribe(),
+            None => broadcast::Sender::new(1).subscribe(),
+        }
+    }
+}

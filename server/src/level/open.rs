@@ -1,0 +1,239 @@
+//! Reading a level back from the store: stored tiles and the features of its log up to the
+//! revision of those tiles, then the rest of the log.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use mapfold_map::level::FeatureId;
+use mapfold_map::raster::{Tile, TileKey};
+use mapfold_schema::border::{Target, parse_feature_id};
+
+use super::folding::Folding;
+use super::history::{History, Least, MapHistory};
+use super::recall::{self, Logged};
+use super::rows;
+use crate::store::levels::LevelRow;
+use crate::store::map_rows::{FeatureRow, MapRows, StoredMap};
+use crate::store::{Store, StoreError, tile_cells};
+
+/// Rows of the log that are read at once without their evidence.
+const FEATURES_PAGE: u32 = 1024;
+/// Whole rows of the log that are read at once.
+pub(super) const LOG_PAGE: u32 = 256;
+
+/// A level as it was read back.
+#[derive(Debug)]
+pub(super) struct Opened {
+    pub(super) row: LevelRow,
+    pub(super) folding: Box<Folding>,
+}
+
+/// Reads a level; `None` if there is none.
+pub(super) async fn open(
+    store: &Store,
+    site: &str,
+    level: &str,
+) -> Result<Option<Opened>, StoreError> {
+    let Some(row) = store.level(site, level).await? else { return Ok(None) };
+    let Some(stored) = store.stored_map(site, level).await? else { return Ok(None) };
+    let target = recall::target(&row);
+    let stored = Arc::new(stored);
+    let folding = match restore(store, &row, &target, &stored).await? {
+        Ok(folding) => catch_up(store, &row, folding).await?,
+        Err(difference) => {
+            tracing::error!(site, level, difference, "stored map is not its log's; folding again");
+            metrics::counter!("mapfold_stored_map_faults_total").increment(1);
+            let folding = Box::new(Folding::empty(row.resolution_m));
+            let folding = catch_up(store, &row, folding).await?;
+            mend(store, &row, stored, folding).await?
+        }
+    };
+    Ok(Some(Opened { row, folding }))
+}
+
+/// Folds what the log holds after `folding`'s revision.
+pub(super) async fn catch_up(
+    store: &Store,
+    row: &LevelRow,
+    mut folding: Box<Folding>,
+) -> Result<Box<Folding>, StoreError> {
+    let target = recall::target(row);
+    loop {
+        let page = store.log_after(&row.site, &row.level, folding.revision(), LOG_PAGE).await?;
+        if page.is_empty() {
+            return Ok(folding);
+        }
+        folding = aside(move || {
+            for row in &page {
+                folding.step(&recall::whole(row, &target)?).map_err(|gap| {
+                    spoilt("contributions", format!("revision {}", row.revision), gap)
+                })?;
+            }
+            Ok(folding)
+        })
+        .await?;
+    }
+}
+
+/// The level as of the stored map, or in words how the stored map differs from its log.
+async fn restore(
+    store: &Store,
+    row: &LevelRow,
+    target: &Target,
+    stored: &Arc<StoredMap>,
+) -> Result<Result<Box<Folding>, String>, StoreError> {
+    let mut log: Vec<Logged> = Vec::new();
+    let mut after = 0;
+    while after < stored.folded_revision {
+        let page = store
+            .features_after(&row.site, &row.level, after, stored.folded_revision, FEATURES_PAGE)
+            .await?;
+        let Some(last) = page.last() else { break };
+        after = last.revision;
+        let target = *target;
+        log.extend(
+            aside(move || {
+                page.iter()
+                    .map(|row| recall::features(row, &target))
+                    .collect::<Result<Vec<_>, StoreError>>()
+            })
+            .await?,
+        );
+    }
+    if log.len() as i64 != stored.folded_revision {
+        return Err(spoilt(
+            "contributions",
+            format!("revisions up to {}", stored.folded_revision),
+            format!("there are {}", log.len()),
+        ));
+    }
+    let (resolution_m, stored) = (row.resolution_m, Arc::clone(stored));
+    aside(move || Ok(restored_with_history(resolution_m, &stored, &log).map(Box::new))).await
+}
+
+fn restored_with_history(
+    resolution_m: f64,
+    stored: &StoredMap,
+    log: &[Logged],
+) -> Result<Folding, String> {
+    let mut tiles: BTreeMap<TileKey, Tile> = BTreeMap::new();
+    for row in &stored.rows.tiles {
+        if let Some(content) = &row.content {
+            let tile = tile_cells::decode(content).map_err(|e| format!("{:?}: {e}", row.key))?;
+            tiles.insert(row.key, tile);
+        }
+    }
+    let mut folding = Folding::restored(resolution_m, stored.folded_revision, tiles, log);
+    let map = folding.level().map().clone();
+    let mut history = MapHistory::default();
+    for row in &stored.rows.tiles {
+        history.tiles.put(row.key, row.revision, map.tiles.get(&row.key).cloned());
+    }
+    adopt(&stored.rows.segments, &map.segments, rows::segment, &mut history.segments)?;
+    adopt(&stored.rows.clusters, &map.clusters, rows::cluster, &mut history.clusters)?;
+    *folding.history_mut() = history;
+    Ok(folding)
+}
+
+/// Takes the dates of stored features over, if the features are the very ones of the fold.
+fn adopt<V: PartialEq>(
+    stored: &[FeatureRow],
+    folded: &BTreeMap<FeatureId, Arc<V>>,
+    content: fn(&FeatureId, &V) -> Result<Vec<u8>, String>,
+    history: &mut History<FeatureId, V>,
+) -> Result<(), String> {
+    for row in stored {
+        let id = parse_feature_id(&row.feature)
+            .ok_or_else(|| format!("{:?} is no feature", row.feature))?;
+        let value = folded.get(&id);
+        if value.map(|v| content(&id, v)).transpose()? != row.content {
+            return Err(format!("feature {} is another", row.feature));
+        }
+        history.put(id, row.revision, value.cloned());
+    }
+    match folded.keys().find(|id| history.get(id).is_none()) {
+        Some(id) => Err(format!("feature {id:?} is missing")),
+        None => Ok(()),
+    }
+}
+
+/// Puts a stored map right that differs from what its log folds to: what differs counts as
+/// changed at the newest revision, so that readers who were told otherwise learn of it with their
+/// next question, and everything is written at once.
+async fn mend(
+    store: &Store,
+    row: &LevelRow,
+    stored: Arc<StoredMap>,
+    mut folding: Box<Folding>,
+) -> Result<Box<Folding>, StoreError> {
+    let from = stored.folded_revision;
+    let (folding, everything) = aside(move || {
+        let revision = folding.revision();
+        let true_rows = rows::changed(folding.history(), -1, revision)?;
+        let known = |rows: &[FeatureRow]| -> BTreeMap<String, Option<Vec<u8>>> {
+            rows.iter().map(|r| (r.feature.clone(), r.content.clone())).collect()
+        };
+        let history = folding.history_mut();
+        redate(&stored.rows.segments, &known(&true_rows.segments), revision, &mut history.segments);
+        redate(&stored.rows.clusters, &known(&true_rows.clusters), revision, &mut history.clusters);
+        let true_tiles: BTreeMap<TileKey, Option<Vec<u8>>> =
+            true_rows.tiles.iter().map(|r| (r.key, r.content.clone())).collect();
+        for row in &stored.rows.tiles {
+            if true_tiles.get(&row.key) != Some(&row.content) {
+                redate_one(row.key, revision, &mut history.tiles);
+            }
+        }
+        let everything = rows::changed(folding.history(), -1, revision)?;
+        Ok((folding, everything))
+    })
+    .await?;
+    write_mended(store, row, from, folding.revision(), &everything).await?;
+    Ok(folding)
+}
+
+async fn write_mended(
+    store: &Store,
+    row: &LevelRow,
+    from: i64,
+    to: i64,
+    everything: &MapRows,
+) -> Result<(), StoreError> {
+    let written = store.write_map(&row.site, &row.level, from, to, everything).await?;
+    tracing::info!(site = row.site, level = row.level, rows = everything.len(), ?written, "mended");
+    Ok(())
+}
+
+fn redate<V: PartialEq>(
+    stored: &[FeatureRow],
+    true_rows: &BTreeMap<String, Option<Vec<u8>>>,
+    revision: i64,
+    history: &mut History<FeatureId, V>,
+) {
+    for row in stored {
+        if true_rows.get(&row.feature) != Some(&row.content)
+            && let Some(id) = parse_feature_id(&row.feature)
+        {
+            redate_one(id, revision, history);
+        }
+    }
+}
+
+fn redate_one<K: Least, V: PartialEq>(key: K, revision: i64, history: &mut History<K, V>) {
+    let value = history.get(&key).and_then(|(_, value)| value.cloned());
+    history.put(key, revision, value);
+}
+
+/// Runs heavy work on a thread that may block. A panic in it is the store's fault or the fold's;
+/// either way the level cannot be opened.
+pub(super) async fn aside<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, StoreError> + Send + 'static,
+) -> Result<T, StoreError> {
+    match tokio::task::spawn_blocking(work).await {
+        Ok(outcome) => outcome,
+        Err(panic) => Err(spoilt("levels", "fold", panic)),
+    }
+}
+
+fn spoilt(table: &'static str, key: impl Into<String>, detail: impl ToString) -> StoreError {
+    StoreError::Corrupt { table, key: key.into(), detail: detail.to_string() }
+}

@@ -1,0 +1,55 @@
+//! From a level's history to the rows of the store.
+
+use mapfold_map::level::FeatureId;
+use mapfold_map::vector::{Cluster, Segment};
+use mapfold_schema::border::{feature_id, wire_cluster, wire_segment};
+use mapfold_schema::codec;
+
+use super::history::{History, MapHistory};
+use crate::store::map_rows::{FeatureRow, MapRows, TileRow};
+use crate::store::{StoreError, tile_cells};
+
+/// The rows of all that changed after `since` and not after `until`, in the order of their keys:
+/// two replicas that write the same rows then wait for each other instead of locking crosswise.
+pub(crate) fn changed(history: &MapHistory, since: i64, until: i64) -> Result<MapRows, StoreError> {
+    let unfit = |table, detail: String| StoreError::Corrupt { table, key: "a row".into(), detail };
+    let mut tiles = Vec::new();
+    for (revision, key, tile) in history.tiles.changed(since, until) {
+        let content = tile.map(|tile| tile_cells::encode(tile)).transpose();
+        let content = content.map_err(|e| unfit("tiles", e.to_string()))?;
+        tiles.push(TileRow { key, revision, content });
+    }
+    tiles.sort_unstable_by_key(|row| row.key);
+    Ok(MapRows {
+        segments: features(&history.segments, since, until, segment)
+            .map_err(|e| unfit("segments", e))?,
+        clusters: features(&history.clusters, since, until, cluster)
+            .map_err(|e| unfit("clusters", e))?,
+        tiles,
+    })
+}
+
+/// The column of a segment.
+pub(super) fn segment(id: &FeatureId, segment: &Segment) -> Result<Vec<u8>, String> {
+    codec::to_cbor(&wire_segment(id, segment)).map_err(|e| e.to_string())
+}
+
+/// The column of a cluster.
+pub(super) fn cluster(id: &FeatureId, cluster: &Cluster) -> Result<Vec<u8>, String> {
+    codec::to_cbor(&wire_cluster(id, cluster)).map_err(|e| e.to_string())
+}
+
+fn features<V: PartialEq>(
+    history: &History<FeatureId, V>,
+    since: i64,
+    until: i64,
+    content: fn(&FeatureId, &V) -> Result<Vec<u8>, String>,
+) -> Result<Vec<FeatureRow>, String> {
+    let mut rows = Vec::new();
+    for (revision, id, value) in history.changed(since, until) {
+        let content = value.map(|value| content(&id, value)).transpose()?;
+        rows.push(FeatureRow { feature: feature_id(&id), revision, content });
+    }
+    rows.sort_unstable_by(|a, b| a.feature.cmp(&b.feature));
+    Ok(rows)
+}

@@ -1,0 +1,272 @@
+//! Refolds a level's log from empty and compares it with what is stored.
+//!
+//! Twice, by two ways: one contribution at a time in the order of the log, which also gives the
+//! date of each thing's last change, and page by page in reverse order, which must come to the
+//! same map because the fold is a function of the set.
+
+use std::collections::BTreeMap;
+
+use mapfold_map::level::{Level, LevelConfig};
+use mapfold_schema::border::Target;
+use mapfold_schema::digest::content_digest;
+use sha2::{Digest, Sha256};
+
+use crate::level::folding::Folding;
+use crate::level::recall::{self, Logged};
+use crate::level::rows;
+use crate::store::levels::LevelRow;
+use crate::store::log::LogRow;
+use crate::store::map_rows::{FeatureRow, MapRows, StoredMap};
+use crate::store::{Store, StoreError, payload};
+
+/// Rows of the log that are read and folded at once.
+const PAGE: u32 = 256;
+
+/// What a check of one level found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Report {
+    /// Slug of the site.
+    pub site: String,
+    /// Slug of the level.
+    pub level: String,
+    /// Newest revision of the log: the one to which the counts and the digest belong.
+    pub revision: i64,
+    /// Revision up to which the stored map is folded: the one at which it was compared.
+    pub folded_revision: i64,
+    /// Contributions read.
+    pub contributions: i64,
+    /// Segments of the refolded map.
+    pub segments: usize,
+    /// Clusters of the refolded map.
+    pub clusters: usize,
+    /// Tiles of the refolded map.
+    pub tiles: usize,
+    /// SHA-256 of the refolded map in canonical form, lower-case hexadecimal: equal maps have
+    /// equal digests, on every engine and replica.
+    pub map_digest: String,
+    /// What is wrong, a sentence each; empty if nothing is. At most
+    /// [`FAULTS_MAX`](Self::FAULTS_MAX).
+    pub faults: Vec<String>,
+}
+
+impl Report {
+    /// Faults that are listed.
+    pub const FAULTS_MAX: usize = 100;
+
+    /// Whether nothing is wrong.
+    pub fn is_sound(&self) -> bool {
+        self.faults.is_empty()
+    }
+}
+
+/// Checks one level and, on SQLite, the file; `None` if there is no such level. It may be in use
+/// meanwhile.
+///
+/// # Errors
+/// The store cannot be read at all. What can be read and is wrong is in the report.
+pub async fn verify(store: &Store, site: &str, level: &str) -> Result<Option<Report>, StoreError> {
+    let Some(row) = store.level(site, level).await? else { return Ok(None) };
+    let Some(stored) = store.stored_map(site, level).await? else { return Ok(None) };
+    let mut check = Check::new(&row, stored);
+    for fault in store.check_file().await? {
+        check.fault(format!("database file: {fault}"));
+    }
+    let mut after = 0;
+    loop {
+        let page = store.log_after(site, level, after, PAGE).await?;
+        let Some(last) = page.last() else { break };
+        after = last.revision;
+        let run = tokio::task::spawn_blocking(move || {
+            check.fold(&page);
+            check
+        });
+        check = run.await.map_err(|panic| StoreError::Corrupt {
+            table: "contributions",
+            key: format!("revisions up to {after}"),
+            detail: format!("the fold panicked: {panic}"),
+        })?;
+    }
+    Ok(Some(check.report(&row)))
+}
+
+struct Check {
+    target: Target,
+    stored: StoredMap,
+    stepwise: Folding,
+    reversed: Level,
+    read: i64,
+    faults: Vec<String>,
+}
+
+impl Check {
+    fn new(row: &LevelRow, stored: StoredMap) -> Self {
+        let mut check = Self {
+            target: recall::target(row),
+            stored,
+            stepwise: Folding::empty(row.resolution_m),
+            reversed: Level::new(LevelConfig::standard(row.resolution_m)),
+            read: 0,
+            faults: Vec::new(),
+        };
+        if check.stored.folded_revision == 0 {
+            check.compare_stored();
+        }
+        check
+    }
+
+    fn fault(&mut self, fault: String) {
+        if self.faults.len() < Report::FAULTS_MAX {
+            self.faults.push(fault);
+        }
+    }
+
+    /// Folds a page of the log both ways.
+    fn fold(&mut self, page: &[LogRow]) {
+        let mut logged: Vec<Logged> = Vec::with_capacity(page.len());
+        for row in page {
+            self.read += 1;
+            match self.recall(row) {
+                Ok(contribution) => logged.push(contribution),
+                Err(fault) => self.fault(format!("revision {}: {fault}", row.revision)),
+            }
+        }
+        // The stored map may end within the page: the ways must meet there.
+        let (until, rest): (Vec<Logged>, Vec<Logged>) =
+            logged.into_iter().partition(|l| l.revision <= self.stored.folded_revision);
+        for piece in [until, rest] {
+            if piece.is_empty() {
+                continue;
+            }
+            let in_force = piece.iter().rev().filter(|logged| logged.in_force());
+            self.reversed.fold(in_force.map(|logged| &*logged.contribution));
+            for logged in &piece {
+                if let Err(gap) = self.stepwise.step(logged) {
+                    self.fault(gap.to_string());
+                }
+            }
+            if self.stepwise.revision() == self.stored.folded_revision {
+                self.compare_ways();
+                self.compare_stored();
+            }
+        }
+    }
+
+    fn recall(&self, row: &LogRow) -> Result<Logged, String> {
+        let uploaded = payload::join(&row.payload.features, &row.payload.evidence)
+            .map_err(|e| e.to_string())?;
+        let digest = content_digest(&uploaded).map_err(|e| e.to_string())?;
+        if digest != row.digest {
+            return Err(format!("its digest is {digest}, not {}", row.digest));
+        }
+        recall::whole(row, &self.target).map_err(|e| e.to_string())
+    }
+
+    fn compare_ways(&mut self) {
+        if self.stepwise.level().map() != self.reversed.map() {
+            let revision = self.stepwise.revision();
+            self.fault(format!("revision {revision}: the fold depends on the order"));
+        }
+    }
+
+    fn compare_stored(&mut self) {
+        let (rows, revision) = (std::mem::take(&mut self.stored.rows), self.stepwise.revision());
+        let refolded = match rows::changed(self.stepwise.history(), -1, revision) {
+            Ok(refolded) => refolded,
+            Err(error) => return self.fault(error.to_string()),
+        };
+        let features = |rows: &[FeatureRow]| -> Dated {
+            rows.iter()
+                .map(|row| (row.feature.clone(), (row.revision, row.content.clone())))
+                .collect()
+        };
+        let tiles = |rows: &MapRows| -> Dated {
+            rows.tiles
+                .iter()
+                .map(|row| (format!("{:?}", row.key), (row.revision, row.content.clone())))
+                .collect()
+        };
+        self.compare("segment", &features(&rows.segments), &features(&refolded.segments));
+        self.compare("cluster", &features(&rows.clusters), &features(&refolded.clusters));
+        self.compare("tile", &tiles(&rows), &tiles(&refolded));
+    }
+
+    fn compare(&mut self, kind: &str, stored: &Dated, refolded: &Dated) {
+        for (key, (revision, content)) in stored {
+            match refolded.get(key) {
+                None => self.fault(format!("{kind} {key} is stored but not in the log's fold")),
+                Some((_, other)) if other != content => {
+                    self.fault(format!("{kind} {key} is stored with other content"));
+                }
+                Some((other, _)) if other != revision => self.fault(format!(
+                    "{kind} {key} is stored as of revision {revision}, but changed at {other}"
+                )),
+                Some(_) => {}
+            }
+        }
+        for key in refolded.keys().filter(|key| !stored.contains_key(*key)) {
+            self.fault(format!("{kind} {key} is not stored"));
+        }
+    }
+
+    fn report(mut self, row: &LevelRow) -> Report {
+        self.compare_ways();
+        let revision = self.stepwise.revision();
+        if revision < row.revision {
+            self.fault(format!("the log ends at revision {revision}, not {}", row.revision));
+        }
+        if revision < self.stored.folded_revision {
+            self.fault(format!(
+                "the stored map is of revision {}, which the log has not reached",
+                self.stored.folded_revision
+            ));
+        }
+        let map_digest = match map_digest(&self.stepwise) {
+            Ok(digest) => digest,
+            Err(error) => {
+                self.fault(error.to_string());
+                String::new()
+            }
+        };
+        let map = self.stepwise.level().map();
+        Report {
+            site: row.site.clone(),
+            level: row.level.clone(),
+            revision,
+            folded_revision: self.stored.folded_revision,
+            contributions: self.read,
+            segments: map.segments.len(),
+            clusters: map.clusters.len(),
+            tiles: map.tiles.len(),
+            map_digest,
+            faults: self.faults,
+        }
+    }
+}
+
+/// Rows by key: revision and content.
+type Dated = BTreeMap<String, (i64, Option<Vec<u8>>)>;
+
+/// The digest of what a map holds, without dates: kind, key and content of each thing in order,
+/// each with its length before it.
+fn map_digest(folding: &Folding) -> Result<String, StoreError> {
+    let rows = rows::changed(folding.history(), -1, folding.revision())?;
+    let mut digest = Sha256::new();
+    let mut add = |kind: &str, key: &str, content: &[u8]| {
+        for part in [kind.as_bytes(), key.as_bytes(), content] {
+            digest.update((part.len() as u64).to_le_bytes());
+            digest.update(part);
+        }
+    };
+    for (kind, rows) in [("segment", &rows.segments), ("cluster", &rows.clusters)] {
+        for row in rows {
+            if let Some(content) = &row.content {
+                add(kind, &row.feature, content);
+            }
+        }
+    }
+    for (key, tile) in &folding.level().map().tiles {
+        let cells: Vec<u8> = tile.cells().iter().flat_map(|cell| cell.to_le_bytes()).collect();
+        add("tile", &format!("{:?}/{}/{}", key.class, key.tile.x, key.tile.y), &cells);
+    }
+    Ok(digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
+}
