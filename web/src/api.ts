@@ -1,0 +1,162 @@
+// The server's HTTP API, one function per request that the page makes. Every failure is one of two:
+// the server refused (with its problem), or it could not be reached.
+
+import type { Place } from "./permalink";
+import type { Evidence, PictureAddress } from "./pyramid";
+import type {
+  ContributionPage,
+  LevelDescription,
+  Problem,
+  RasterChanges,
+  RobotDescription,
+  SessionDescription,
+  SiteDescription,
+  VectorPatch,
+} from "./wire";
+
+/** The server answered and said no. */
+export class Refused extends Error {
+  override readonly name = "Refused";
+  constructor(
+    readonly status: number,
+    readonly problem: Problem | null,
+  ) {
+    super(problem?.detail ?? `The server answered with status ${status}.`);
+  }
+}
+
+/** No answer came, or none that makes sense. */
+export class Unreachable extends Error {
+  override readonly name = "Unreachable";
+}
+
+/** Longest wait for an answer. */
+const PATIENCE_MS = 30_000;
+
+/** What the API needs of the browser. */
+export interface Browser {
+  fetch: typeof fetch;
+  nowMs: () => number;
+}
+
+export interface Api {
+  /** The server's time, as its answers tell it. */
+  nowMs: () => number;
+  signIn: (token: string) => Promise<SessionDescription>;
+  signOut: () => Promise<void>;
+  /** Who is signed in; null if nobody is. */
+  session: () => Promise<SessionDescription | null>;
+  sites: () => Promise<SiteDescription[]>;
+  level: (place: Place, signal: AbortSignal) => Promise<LevelDescription>;
+  robots: (place: Place, signal: AbortSignal) => Promise<RobotDescription[]>;
+  contributions: (place: Place, options: { limit: number; robot?: string }, signal: AbortSignal) => Promise<ContributionPage>;
+  vector: (place: Place, since: number, signal: AbortSignal) => Promise<VectorPatch>;
+  raster: (place: Place, since: number, signal: AbortSignal) => Promise<RasterChanges>;
+  /** One picture of the raster; null where there is nothing to see. */
+  picture: (place: Place, picture: PictureAddress, evidence: Evidence) => Promise<Blob | null>;
+}
+
+function levelPath(place: Place): string {
+  return `/api/v1/sites/${encodeURIComponent(place.site)}/levels/${encodeURIComponent(place.level)}`;
+}
+
+/** Where the live events of a level are. */
+export function eventsPath(place: Place): string {
+  return `${levelPath(place)}/events`;
+}
+
+/** Where a picture of the raster is. */
+export function picturePath(place: Place, picture: PictureAddress, evidence: Evidence): string {
+  return `${levelPath(place)}/tiles/${picture.z}/${picture.row}/${picture.col}.png?layer=${evidence}`;
+}
+
+/** What went wrong, as a sentence for people. */
+export function inWords(error: unknown): string {
+  if (error instanceof Refused || error instanceof Unreachable) return error.message;
+  return error instanceof Error ? `The page failed: ${error.message}` : "The page failed.";
+}
+
+/** Whether the work was called off. */
+export function isAborted(error: unknown): boolean {
+  return error instanceof DOMException && error.name === "AbortError";
+}
+
+async function problemOf(response: Response): Promise<Problem | null> {
+  const type = response.headers.get("content-type") ?? "";
+  if (!type.includes("json")) return null;
+  const body = (await response.json()) as Partial<Problem>;
+  return typeof body.detail === "string" ? (body as Problem) : null;
+}
+
+export function createApi(browser: Browser): Api {
+  let serverAheadMs = 0;
+
+  const ask = async (path: string, init: RequestInit = {}): Promise<Response> => {
+    const patience = AbortSignal.timeout(PATIENCE_MS);
+    const signal = init.signal ? AbortSignal.any([init.signal, patience]) : patience;
+    let response: Response;
+    try {
+      response = await browser.fetch(path, { ...init, signal });
+    } catch (error) {
+      if (isAborted(error)) throw error;
+      throw new Unreachable("The server cannot be reached.");
+    }
+    const date = Date.parse(response.headers.get("date") ?? "");
+    // `Date` is cut to the second: half a second is the best guess of what was cut.
+    if (!Number.isNaN(date)) serverAheadMs = date + 500 - browser.nowMs();
+    if (!response.ok) throw new Refused(response.status, await problemOf(response).catch(() => null));
+    return response;
+  };
+
+  const askJson = async <T>(path: string, init?: RequestInit): Promise<T> => {
+    const headers = new Headers(init?.headers);
+    headers.set("accept", "application/json");
+    const response = await ask(path, { ...init, headers });
+    try {
+      return (await response.json()) as T;
+    } catch (error) {
+      if (isAborted(error)) throw error;
+      throw new Unreachable("The server's answer cannot be read.");
+    }
+  };
+
+  return {
+    nowMs: () => browser.nowMs() + serverAheadMs,
+    signIn: (token) =>
+      askJson("/api/v1/session", {
+        method: "POST",
+        headers: { "content-type": "application/json" },
+        body: JSON.stringify({ token }),
+      }),
+    signOut: async () => {
+      await ask("/api/v1/session", { method: "DELETE" });
+    },
+    session: async () => {
+      try {
+        return await askJson<SessionDescription>("/api/v1/session");
+      } catch (error) {
+        if (error instanceof Refused && error.status === 401) return null;
+        throw error;
+      }
+    },
+    sites: () => askJson("/api/v1/sites"),
+    level: (place, signal) => askJson(levelPath(place), { signal }),
+    robots: (place, signal) => askJson(`/api/v1/sites/${encodeURIComponent(place.site)}/robots`, { signal }),
+    contributions: (place, { limit, robot }, signal) => {
+      const filter = robot === undefined ? "" : `&robot=${encodeURIComponent(robot)}`;
+      return askJson(`${levelPath(place)}/contributions?limit=${limit}${filter}`, { signal });
+    },
+    vector: (place, since, signal) => askJson(`${levelPath(place)}/vector?since=${since}`, { signal }),
+    raster: (place, since, signal) => askJson(`${levelPath(place)}/raster?since=${since}`, { signal }),
+    picture: async (place, picture, evidence) => {
+      try {
+        // "no-cache" asks the server whether the copy at hand is still good; mostly it is.
+        const response = await ask(picturePath(place, picture, evidence), { cache: "no-cache" });
+        return response.status === 204 ? null : await response.blob();
+      } catch (error) {
+        if (error instanceof Refused && error.status === 404) return null;
+        throw error;
+      }
+    },
+  };
+}

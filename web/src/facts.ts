@@ -1,0 +1,52 @@
+// What the page shows, as `data-` attributes of the root element, for tests and other observers:
+//
+//   data-session          asking | unreachable | out | signing-in | in
+//   data-site, data-level what is chosen
+//   data-live             idle | connecting | live | lost
+//   data-revision         the revision that is painted
+//   data-segments         segments that are painted (on the screen or beside it)
+//   data-pieces-painted   straight pieces of them that are on the screen
+//   data-clusters, data-robots
+//   data-tiles            tiles that hold evidence
+//   data-tiles-loaded     pictures of the raster that are loaded
+//   data-tiles-pending    pictures on the screen that are missing or stale
+
+import { tileCount } from "./content";
+import type { Painted } from "./map/view";
+import { memo } from "./memo";
+import { robotsHere, type State } from "./state";
+
+export interface Facts {
+  /** After the panels were drawn. */
+  drawn: (state: State) => void;
+  /** After the map was painted. */
+  painted: (state: State, painted: Painted) => void;
+}
+
+export function createFacts(root: HTMLElement): Facts {
+  const tiles = memo(tileCount);
+  const say = (name: string, value: string | number): void => {
+    const text = String(value);
+    if (root.dataset[name] !== text) root.dataset[name] = text;
+  };
+  return {
+    drawn({ session, place, link }) {
+      say("session", session.kind);
+      say("site", place?.site ?? "");
+      say("level", place?.level ?? "");
+      say("live", link.kind);
+    },
+    painted(state, { piecesPainted, picturesLoaded, picturesPending }) {
+      const { content } = state;
+      say("segments", content.segments.size);
+      say("piecesPainted", piecesPainted);
+      say("clusters", content.clusters.size);
+      say("robots", robotsHere(state).length);
+      say("tiles", tiles(content));
+      say("tilesLoaded", picturesLoaded);
+      say("tilesPending", picturesPending);
+      // Last, for whoever waits for a revision and then reads the rest.
+      say("revision", content.vectorRevision);
+    },
+  };
+}

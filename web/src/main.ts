@@ -1,0 +1,159 @@
+// Puts the page together: state, requests, map and panels. The only place that knows them all, and
+// the only one that reads the clock.
+
+import { createApi } from "./api";
+import { setShown } from "./dom";
+import { createFacts } from "./facts";
+import { followLevel } from "./feed";
+import { createMapView } from "./map/view";
+import { DARK, LIGHT, type Theme } from "./palette";
+import { createContributionsCard } from "./panels/contributions_card";
+import { createHeader } from "./panels/header";
+import { createLayersCard } from "./panels/layers_card";
+import { createLevelCard } from "./panels/level_card";
+import { createMapTools, ZOOM_STEP } from "./panels/map_tools";
+import { createMessages } from "./panels/messages";
+import { createRobotsCard } from "./panels/robots_card";
+import { createSelectionCard } from "./panels/selection_card";
+import { createSignIn } from "./panels/sign_in";
+import { formatPermalink, parsePermalink, takeToken } from "./permalink";
+import { pick } from "./pick";
+import { resume, signIn, signOut } from "./session";
+import { initialState, samePlace } from "./state";
+import { createStore } from "./store";
+
+/** How often the ages on the page are brought up to date. */
+const TICK_MS = 5_000;
+
+function byId(id: string): HTMLElement {
+  const element = document.getElementById(id);
+  if (element === null) throw new Error(`the page has no #${id}`);
+  return element;
+}
+
+const timers = {
+  setTimeout: (run: () => void, delayMs: number) => window.setTimeout(run, delayMs),
+  clearTimeout: (timer: number) => {
+    window.clearTimeout(timer);
+  },
+};
+const api = createApi({ fetch: window.fetch.bind(window), nowMs: () => Date.now() });
+
+// A token in the address must not stay there: it would end up in bookmarks and in other people's hands.
+const { token, rest } = takeToken(window.location.hash);
+if (token !== null) history.replaceState(null, "", window.location.pathname + window.location.search + rest);
+
+const store = createStore(initialState(parsePermalink(rest), api.nowMs()), (draw) => {
+  window.requestAnimationFrame(draw);
+});
+const { dispatch } = store;
+
+const darkScheme = window.matchMedia("(prefers-color-scheme: dark)");
+const theme = (): Theme => (darkScheme.matches ? DARK : LIGHT);
+
+// The map.
+const stage = byId("map");
+const facts = createFacts(document.documentElement);
+const map = createMapView({
+  target: stage,
+  store,
+  api,
+  theme,
+  timers,
+  onPainted: facts.painted,
+});
+
+// The panels.
+const panels = byId("panels");
+const overMap = byId("over-map");
+const draws = [
+  createHeader({ parent: byId("header"), store, onSignOut: () => void signOut(api, dispatch) }),
+  createLevelCard(panels),
+  createRobotsCard(panels, { store, theme }),
+  createLayersCard(panels, store),
+  createContributionsCard(panels, { store, theme }),
+  createSelectionCard(overMap, store),
+  createMapTools({ parent: overMap, store, onZoom: map.zoomBy }),
+  createMessages(overMap, window.location.origin),
+  createSignIn({
+    parent: byId("screen"),
+    onSignIn: (value) => void signIn(api, dispatch, value),
+    onRetry: () => void resume(api, dispatch),
+  }),
+  map.draw,
+  facts.drawn,
+];
+const page = byId("page");
+store.onFrame((state) => {
+  setShown(page, state.session.kind === "in");
+  page.classList.toggle("panels-open", state.panelsOpen);
+  for (const draw of draws) draw(state);
+});
+darkScheme.addEventListener("change", () => {
+  dispatch({ kind: "tick", nowMs: api.nowMs() });
+});
+
+// Acting on changes: following the chosen level, and keeping the address bar up to date.
+let unfollow: (() => void) | null = null;
+store.onChange((state, before) => {
+  const follows = state.session.kind === "in" && state.sites !== null ? state.place : null;
+  const followed = before.session.kind === "in" && before.sites !== null ? before.place : null;
+  if (!samePlace(follows, followed)) {
+    unfollow?.();
+    unfollow =
+      follows === null
+        ? null
+        : followLevel({
+            place: follows,
+            api,
+            state: store.state,
+            dispatch,
+            openEvents: (path) => new EventSource(path),
+            timers,
+          });
+  }
+});
+store.onChange((state) => {
+  if (state.session.kind !== "in" || state.place === null) return;
+  const hash = formatPermalink(state);
+  if (hash !== window.location.hash) history.replaceState(null, "", hash);
+});
+window.addEventListener("hashchange", () => {
+  const hash = takeToken(window.location.hash);
+  if (hash.token !== null) void signIn(api, dispatch, hash.token);
+  dispatch({ kind: "permalink", link: parsePermalink(hash.rest) });
+});
+
+// Keys, while nobody types.
+document.addEventListener("keydown", (event) => {
+  const typing = event.target instanceof Element && event.target.closest("input, select, textarea") !== null;
+  if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
+  const state = store.state();
+  switch (event.key) {
+    case "f":
+      dispatch({ kind: "view", view: { kind: "fit" } });
+      break;
+    case "g":
+      dispatch({ kind: "layer", name: "grid", setting: { on: !state.layers.grid.on } });
+      break;
+    case "+":
+    case "-":
+      // Over the map OpenLayers sees to it.
+      if (document.activeElement !== stage) map.zoomBy(event.key === "+" ? ZOOM_STEP : 1 / ZOOM_STEP);
+      break;
+    case "Escape":
+      dispatch({ kind: "select", selection: null });
+      break;
+    case "Enter":
+      if (document.activeElement === stage) {
+        dispatch({ kind: "select", selection: pick(state, map.centre(), state.shownResolution) });
+      }
+      break;
+  }
+});
+
+window.setInterval(() => {
+  dispatch({ kind: "tick", nowMs: api.nowMs() });
+}, TICK_MS);
+
+void (token === null ? resume(api, dispatch) : signIn(api, dispatch, token));

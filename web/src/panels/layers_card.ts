@@ -1,0 +1,91 @@
+// Which layers are shown, and how strongly.
+
+import { el, setShown } from "../dom";
+import { LAYER_NAMES, LAYER_TITLES, type LayerName } from "../layers";
+import type { Evidence } from "../pyramid";
+import type { State } from "../state";
+import type { Store } from "../store";
+
+const EVIDENCE: readonly { value: Evidence; title: string }[] = [
+  { value: "all", title: "all sensors" },
+  { value: "scanner", title: "scanners only" },
+  { value: "sonar", title: "sonar only" },
+];
+
+/** The shades of the server's pictures. */
+const SHADES = [
+  { name: "free", title: "free" },
+  { name: "occupied", title: "occupied" },
+  { name: "sonar", title: "only by sonar" },
+] as const;
+
+export function createLayersCard(parent: HTMLElement, store: Store): (state: State) => void {
+  // The uppermost layer first, as one sees them.
+  const rows = [...LAYER_NAMES].reverse().map((name) => createRow(name, store));
+  const evidence = el(
+    "select",
+    {
+      attrs: { "aria-label": "Sensors whose evidence is shown" },
+      on: {
+        change: () => {
+          const chosen = EVIDENCE.find(({ value }) => value === evidence.value);
+          if (chosen !== undefined) store.dispatch({ kind: "evidence", evidence: chosen.value });
+        },
+      },
+    },
+    ...EVIDENCE.map(({ value, title }) => el("option", { text: title, attrs: { value } })),
+  );
+  const evidenceRow = el(
+    "div",
+    { class: "layer-options" },
+    el("div", {}, el("span", { text: "seen by" }), evidence),
+    el(
+      "div",
+      { class: "shades" },
+      ...SHADES.map(({ name, title }) => el("span", {}, el("i", { class: `shade shade-${name}` }), title)),
+    ),
+  );
+  rows.find(({ name }) => name === "raster")?.element.append(evidenceRow);
+  parent.append(
+    el("section", { class: "card" }, el("h2", { text: "Layers" }), el("ul", { class: "layers" }, ...rows.map(({ element }) => element))),
+  );
+
+  return (state) => {
+    for (const { draw } of rows) draw(state);
+    if (evidence.value !== state.evidence) evidence.value = state.evidence;
+    setShown(evidenceRow, state.layers.raster.on);
+  };
+}
+
+function createRow(name: LayerName, store: Store): { name: LayerName; element: HTMLElement; draw: (state: State) => void } {
+  const title = LAYER_TITLES[name];
+  const on = el("input", {
+    attrs: { type: "checkbox", id: `layer-${name}` },
+    on: {
+      change: () => {
+        store.dispatch({ kind: "layer", name, setting: { on: on.checked } });
+      },
+    },
+  });
+  const opacity = el("input", {
+    attrs: { type: "range", min: "10", max: "100", step: "5", "aria-label": `Opacity of ${title}` },
+    on: {
+      input: () => {
+        store.dispatch({ kind: "layer", name, setting: { opacity: Number(opacity.value) / 100 } });
+      },
+    },
+  });
+  return {
+    name,
+    element: el("li", {}, on, el("label", { text: title, attrs: { for: `layer-${name}` } }), opacity),
+    draw({ layers }) {
+      const setting = layers[name];
+      on.checked = setting.on;
+      opacity.disabled = !setting.on;
+      const percent = String(Math.round(setting.opacity * 100));
+      if (opacity.value !== percent) opacity.value = percent;
+      const title = `${percent} %`;
+      if (opacity.title !== title) opacity.title = title;
+    },
+  };
+}

@@ -1,0 +1,62 @@
+// What lies on the map itself: zooming, the scale bar, the place under the pointer.
+
+import { el, setShown, setText } from "../dom";
+import { scaleBar } from "../scale";
+import type { State } from "../state";
+import type { Store } from "../store";
+import { coordinate, lengthInWords } from "../words";
+
+/** Longest scale bar. */
+const SCALE_MOST_PX = 130;
+/** What one press on + or - does. */
+export const ZOOM_STEP = 1.6;
+
+export interface MapToolsOptions {
+  parent: HTMLElement;
+  store: Store;
+  onZoom: (factor: number) => void;
+}
+
+export function createMapTools({ parent, store, onZoom }: MapToolsOptions): (state: State) => void {
+  const tool = (text: string, title: string, click: () => void): HTMLButtonElement =>
+    el("button", { text, attrs: { type: "button", title, "aria-label": title }, on: { click } });
+  const fit = tool("Fit", "Show the whole level and keep it so (F)", () => {
+    store.dispatch({ kind: "view", view: { kind: "fit" } });
+  });
+  const grid = tool("Grid", "Show or hide the grid (G)", () => {
+    store.dispatch({ kind: "layer", name: "grid", setting: { on: !store.state().layers.grid.on } });
+  });
+  const tools = el(
+    "div",
+    { class: "tools", attrs: { role: "toolbar", "aria-label": "Map" } },
+    tool("+", "Zoom in (+)", () => {
+      onZoom(ZOOM_STEP);
+    }),
+    tool("\u2212", "Zoom out (\u2212)", () => {
+      onZoom(1 / ZOOM_STEP);
+    }),
+    fit,
+    grid,
+  );
+  const bar = el("span", { class: "bar" });
+  const barText = el("span");
+  const pointer = el("output", { class: "pointer", attrs: { "aria-label": "Position under the pointer" } });
+  const foot = el("div", { class: "foot" }, el("span", { class: "scale" }, bar, barText), pointer);
+  parent.append(tools, foot);
+
+  return (state) => {
+    const shown = state.place !== null;
+    setShown(tools, shown);
+    setShown(foot, shown);
+    fit.setAttribute("aria-pressed", String(state.view.kind === "fit"));
+    grid.setAttribute("aria-pressed", String(state.layers.grid.on));
+    const { lengthM, lengthPx } = scaleBar(state.shownResolution, SCALE_MOST_PX);
+    bar.style.width = `${lengthPx.toFixed(1)}px`;
+    setText(barText, lengthInWords(lengthM));
+    setShown(pointer, state.pointer !== null);
+    if (state.pointer !== null) {
+      const [x, y] = state.pointer;
+      setText(pointer, `x ${coordinate(x)}   y ${coordinate(y)}`);
+    }
+  };
+}

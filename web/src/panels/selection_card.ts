@@ -1,0 +1,142 @@
+// What the operator has chosen on the map, in figures.
+
+import { competenceInWords } from "../competence";
+import { angleSd, lengthOf, middleOf, offsetSd } from "../geometry";
+import { el, setShown, setText } from "../dom";
+import { isSilent, type State } from "../state";
+import type { Store } from "../store";
+import type { Cluster, EndKind, RobotDescription, Segment } from "../wire";
+import { ago, coordinate, count, counted, degrees, instant, lengthInWords, listed } from "../words";
+
+/** A card's title and its lines. */
+export interface Description {
+  title: string;
+  lines: readonly (readonly [name: string, value: string])[];
+}
+
+const END_WORDS: Readonly<Record<EndKind, string>> = {
+  corner: "corner",
+  jump: "free end",
+  occluded: "out of view",
+};
+
+/** What is chosen, in words; null if nothing is. */
+export function describe(state: State): Description | null {
+  const { selection, content } = state;
+  if (selection === null) return null;
+  switch (selection.kind) {
+    case "segment": {
+      const segment = content.segments.get(selection.id);
+      return segment === undefined ? null : describeSegment(segment, state);
+    }
+    case "cluster": {
+      const cluster = content.clusters.get(selection.id);
+      return cluster === undefined ? null : describeCluster(cluster, state);
+    }
+    case "robot": {
+      const robot = state.robots.find((one) => one.robot === selection.id);
+      return robot === undefined ? null : describeRobot(robot, state);
+    }
+  }
+}
+
+function names(slugs: readonly string[], state: State): string {
+  return listed(slugs.map((slug) => state.robots.find((robot) => robot.robot === slug)?.name ?? slug));
+}
+
+function describeSegment(segment: Segment, state: State): Description {
+  const middle = middleOf(segment);
+  const sd = offsetSd(segment.covariance, middle);
+  const shared = offsetSd(segment.covariance_dependent, middle);
+  const first = segment.solid.at(0)?.ends[0];
+  const last = segment.solid.at(-1)?.ends[1];
+  return {
+    title: "Segment",
+    lines: [
+      ["Quality", counted(segment.quality, "look")],
+      ["Seen by", names(segment.robots, state)],
+      ["Length", `${lengthInWords(lengthOf(segment))} in ${counted(segment.solid.length, "piece")}`],
+      ["Offset sd", `${lengthInWords(sd)}, of it ${lengthInWords(shared)} shared`],
+      ["Angle sd", degrees(angleSd(segment.covariance), 2)],
+      ["Ends", first === undefined || last === undefined ? "–" : `${END_WORDS[first]}, ${END_WORDS[last]}`],
+      ["Line", `ρ ${coordinate(segment.rho_m)}, α ${degrees(segment.alpha_rad)}`],
+      ["First seen", instant(segment.first_seen)],
+      ["Last seen", instant(segment.last_seen)],
+    ],
+  };
+}
+
+function describeCluster(cluster: Cluster, state: State): Description {
+  const [[xx], [, yy]] = cluster.covariance;
+  const [x, y] = cluster.centroid_m;
+  return {
+    title: "Cluster",
+    lines: [
+      ["Quality", counted(cluster.quality, "look")],
+      ["Points", count(cluster.points)],
+      ["Seen by", names(cluster.robots, state)],
+      ["Centre", `x ${coordinate(x)}, y ${coordinate(y)}`],
+      ["Centre sd", `x ${lengthInWords(Math.sqrt(xx))}, y ${lengthInWords(Math.sqrt(yy))}`],
+      ["First seen", instant(cluster.first_seen)],
+      ["Last seen", instant(cluster.last_seen)],
+    ],
+  };
+}
+
+function describeRobot(robot: RobotDescription, state: State): Description {
+  const pose = robot.last_pose;
+  const heardAtMs = state.heardAtMs.get(robot.robot);
+  const heard = heardAtMs === undefined ? "not while this page is open" : ago(heardAtMs, state.nowMs);
+  const lines: [string, string][] = [
+    ["State", `${robot.state}, ${isSilent(state, robot.robot) ? "offline" : "online"}`],
+    ["Last heard", heard],
+    ["Competence", competenceInWords(robot)],
+    ...robot.sensors.map((sensor): [string, string] => [
+      "Sensor",
+      `${sensor.model === "" ? sensor.kind : sensor.model}, up to ${lengthInWords(sensor.range_max_m)}${sensor.emulated ? ", emulated" : ""}`,
+    ]),
+    ["Contributions", count(robot.contributions)],
+  ];
+  if (pose != null) {
+    const [[xx], [, yy], [, , hh]] = pose.covariance;
+    lines.push(
+      ["Position", `x ${coordinate(pose.x_m)}, y ${coordinate(pose.y_m)}`],
+      ["Position sd", `x ${lengthInWords(Math.sqrt(xx))}, y ${lengthInWords(Math.sqrt(yy))}`],
+      ["Heading", `${degrees(pose.heading_rad)}, sd ${degrees(Math.sqrt(hh), 2)}`],
+      ["Seen at", `${instant(pose.observed_at)} by its clock`],
+    );
+  }
+  if (robot.revision != null) lines.push(["Runs revision", count(robot.revision)]);
+  if (robot.queue_length != null) lines.push(["Waiting to send", count(robot.queue_length)]);
+  return { title: robot.name, lines };
+}
+
+export function createSelectionCard(parent: HTMLElement, store: Store): (state: State) => void {
+  const title = el("h2");
+  const lines = el("dl", { class: "lines" });
+  const close = el("button", {
+    class: "close",
+    text: "×",
+    attrs: { type: "button", "aria-label": "Close", title: "Close (Esc)" },
+    on: {
+      click: () => {
+        store.dispatch({ kind: "select", selection: null });
+      },
+    },
+  });
+  const card = el("section", { class: "card selection", attrs: { "aria-live": "polite" } }, title, close, lines);
+  parent.append(card);
+  let drawn = "";
+
+  return (state) => {
+    const description = describe(state);
+    setShown(card, description !== null);
+    const now = JSON.stringify(description);
+    if (description === null || now === drawn) return;
+    drawn = now;
+    setText(title, description.title);
+    lines.replaceChildren(
+      ...description.lines.flatMap(([name, value]) => [el("dt", { text: name }), el("dd", { text: value })]),
+    );
+  };
+}

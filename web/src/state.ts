@@ -1,0 +1,256 @@
+// All that the page knows, and how each event changes it. Pure: no requests, no drawing, no clock.
+
+import { NO_CONTENT, withRaster, withVector, type Content } from "./content";
+import type { Point } from "./geometry";
+import type { LayerName, Layers, LayerSetting } from "./layers";
+import { withSlots } from "./palette";
+import type { Permalink, Place, View } from "./permalink";
+import type { Evidence } from "./pyramid";
+import type {
+  ContributionEntry,
+  LastPose,
+  LevelDescription,
+  RasterChanges,
+  RobotDescription,
+  SessionDescription,
+  SiteDescription,
+  VectorPatch,
+} from "./wire";
+
+/** Whether the operator is signed in. */
+export type Session =
+  | { kind: "asking" }
+  | { kind: "unreachable"; problem: string }
+  | { kind: "out"; problem: string | null }
+  | { kind: "signing-in" }
+  | { kind: "in"; who: SessionDescription };
+
+/** Whether the page follows the level. */
+export type Link =
+  | { kind: "idle" }
+  | { kind: "connecting" }
+  | { kind: "live" }
+  | { kind: "lost"; sinceMs: number; problem: string };
+
+/** What the operator has chosen on the map. */
+export interface Selection {
+  kind: "segment" | "cluster" | "robot";
+  id: string;
+}
+
+export interface State {
+  session: Session;
+  /** Null until they are known. */
+  sites: readonly SiteDescription[] | null;
+  place: Place | null;
+  /** What the link in the address bar asked for and is not there. */
+  missing: Place | null;
+  /** What is wrong with the chosen level, in words. */
+  trouble: string | null;
+  level: LevelDescription | null;
+  content: Content;
+  robots: readonly RobotDescription[];
+  /** When the server last had something of a robot, by the server's clock. */
+  heardAtMs: ReadonlyMap<string, number>;
+  /** Colour slots of robots. */
+  slots: ReadonlyMap<string, number>;
+  /** The newest ones; null until they are known. */
+  contributions: readonly ContributionEntry[] | null;
+  link: Link;
+  layers: Layers;
+  evidence: Evidence;
+  view: View;
+  /** Metres per pixel as shown, also while the view fits the level. */
+  shownResolution: number;
+  pointer: Point | null;
+  selection: Selection | null;
+  /** Whether the panels are open where they cover the map. */
+  panelsOpen: boolean;
+  /** The server's time. */
+  nowMs: number;
+}
+
+export type Event =
+  | { kind: "session"; session: Session }
+  | { kind: "sites"; sites: readonly SiteDescription[] }
+  | { kind: "place"; place: Place | null }
+  | { kind: "trouble"; trouble: string | null }
+  | { kind: "level"; level: LevelDescription }
+  | { kind: "vector"; patch: VectorPatch }
+  | { kind: "raster"; changes: RasterChanges }
+  | { kind: "robots"; robots: readonly RobotDescription[] }
+  | { kind: "contributions"; contributions: readonly ContributionEntry[] }
+  | { kind: "heard"; robots: readonly string[]; atMs: number }
+  | { kind: "link"; link: Link }
+  | { kind: "layer"; name: LayerName; setting: Partial<LayerSetting> }
+  | { kind: "evidence"; evidence: Evidence }
+  | { kind: "view"; view: View }
+  | { kind: "shown"; resolution: number }
+  | { kind: "pointer"; at: Point | null }
+  | { kind: "select"; selection: Selection | null }
+  | { kind: "panels"; open: boolean }
+  | { kind: "permalink"; link: Permalink }
+  | { kind: "tick"; nowMs: number };
+
+/** What is forgotten with a level. */
+const NO_LEVEL = {
+  trouble: null,
+  level: null,
+  content: NO_CONTENT,
+  robots: [],
+  heardAtMs: new Map<string, number>(),
+  slots: new Map<string, number>(),
+  contributions: null,
+  link: { kind: "idle" },
+  selection: null,
+  pointer: null,
+} as const;
+
+/** The state of a page just opened at a link. */
+export function initialState(link: Permalink, nowMs: number): State {
+  return {
+    ...NO_LEVEL,
+    session: { kind: "asking" },
+    sites: null,
+    place: link.place,
+    missing: null,
+    layers: link.layers,
+    evidence: link.evidence,
+    view: link.view,
+    shownResolution: 1,
+    panelsOpen: false,
+    nowMs,
+  };
+}
+
+/** The state after an event. */
+export function update(state: State, event: Event): State {
+  switch (event.kind) {
+    case "session":
+      return event.session.kind === "out"
+        ? { ...state, ...NO_LEVEL, sites: null, session: event.session }
+        : { ...state, session: event.session };
+    case "sites":
+      return withSites(state, event.sites);
+    case "place":
+      return samePlace(state.place, event.place)
+        ? state
+        : { ...state, ...NO_LEVEL, place: event.place, missing: null, view: { kind: "fit" } };
+    case "trouble":
+      return { ...state, trouble: event.trouble };
+    case "level":
+      return { ...state, level: event.level, trouble: null };
+    case "vector":
+      return forgetSelectionThatIsGone({ ...state, content: withVector(state.content, event.patch) });
+    case "raster":
+      return { ...state, content: withRaster(state.content, event.changes) };
+    case "robots":
+      return {
+        ...state,
+        robots: event.robots,
+        slots: withSlots(state.slots, event.robots.map((robot) => robot.robot)),
+      };
+    case "contributions":
+      return {
+        ...state,
+        contributions: event.contributions,
+        heardAtMs: event.contributions.reduce(
+          (heard, entry) => withHeard(heard, [entry.robot], Date.parse(entry.received_at)),
+          state.heardAtMs,
+        ),
+      };
+    case "heard":
+      return { ...state, heardAtMs: withHeard(state.heardAtMs, event.robots, event.atMs) };
+    case "link":
+      return { ...state, link: event.link };
+    case "layer":
+      return {
+        ...state,
+        layers: { ...state.layers, [event.name]: { ...state.layers[event.name], ...event.setting } },
+      };
+    case "evidence":
+      return { ...state, evidence: event.evidence };
+    case "view":
+      return { ...state, view: event.view };
+    case "shown":
+      return { ...state, shownResolution: event.resolution };
+    case "pointer":
+      return { ...state, pointer: event.at };
+    case "select":
+      return { ...state, selection: event.selection };
+    case "panels":
+      return { ...state, panelsOpen: event.open };
+    case "permalink": {
+      const at = event.link.place === null ? state : update(state, { kind: "place", place: event.link.place });
+      return { ...at, view: event.link.view, layers: event.link.layers, evidence: event.link.evidence };
+    }
+    case "tick":
+      return { ...state, nowMs: event.nowMs };
+  }
+}
+
+/** Whether two places are the same. */
+export function samePlace(a: Place | null, b: Place | null): boolean {
+  return a?.site === b?.site && a?.level === b?.level;
+}
+
+/** With the sites known, a place: the one asked for if it is there, else the first level there is. */
+function withSites(state: State, sites: readonly SiteDescription[]): State {
+  const asked = state.place;
+  if (asked !== null && sites.some((site) => site.site === asked.site && site.levels.includes(asked.level))) {
+    return { ...state, sites, missing: null };
+  }
+  const site = sites.find((one) => one.site === asked?.site && one.levels.length > 0) ?? sites.find((one) => one.levels.length > 0);
+  const level = site?.levels.at(0);
+  const place = site === undefined || level === undefined ? null : { site: site.site, level };
+  const chosen = update(state, { kind: "place", place });
+  return { ...chosen, sites, missing: asked };
+}
+
+function withHeard(
+  heard: ReadonlyMap<string, number>,
+  robots: readonly string[],
+  atMs: number,
+): ReadonlyMap<string, number> {
+  if (Number.isNaN(atMs)) return heard;
+  const later = robots.filter((robot) => (heard.get(robot) ?? -Infinity) < atMs);
+  if (later.length === 0) return heard;
+  const next = new Map(heard);
+  for (const robot of later) next.set(robot, atMs);
+  return next;
+}
+
+function forgetSelectionThatIsGone(state: State): State {
+  const { selection, content } = state;
+  const gone =
+    (selection?.kind === "segment" && !content.segments.has(selection.id)) ||
+    (selection?.kind === "cluster" && !content.clusters.has(selection.id));
+  return gone ? { ...state, selection: null } : state;
+}
+
+/** A robot that the server has had nothing of for this long is drawn as silent. */
+export const SILENT_AFTER_MS = 60_000;
+
+/** Whether a robot is silent. */
+export function isSilent(state: State, robot: string): boolean {
+  const heardAtMs = state.heardAtMs.get(robot);
+  return heardAtMs === undefined || state.nowMs - heardAtMs > SILENT_AFTER_MS;
+}
+
+/** A robot that has been somewhere. */
+export type PlacedRobot = RobotDescription & { last_pose: LastPose };
+
+/** Robots whose last pose is on the chosen level. */
+export function robotsHere(state: State): PlacedRobot[] {
+  return state.robots.filter((robot): robot is PlacedRobot => isHere(state, robot));
+}
+
+/** Whether a robot's last pose is on the chosen level. */
+export function isHere(state: State, robot: RobotDescription): boolean {
+  return robot.last_pose != null && robot.last_pose.level === state.place?.level;
+}
+
+/** Edge of a tile in metres, or null while the level is not known. */
+export function tileEdgeM(level: LevelDescription | null): number | null {
+  return level === null ? null : level.tile_cells * level.resolution_m;
+}
