@@ -9,17 +9,21 @@
 //! * [`plane`], [`floor`], [`coverage`]: the merged map as plain shapes, and how well it agrees
 //!   with the readings that it was made of.
 //! * [`simulation`]: worlds of walls, drives through them with odometry noise, scanners, sonars.
-//! * [`programs`], [`database`], [`server`], [`robot`], [`fleet`], [`meter`], [`api`]: the real
+//! * [`programs`], [`database`], [`server`], [`robot`], [`fleet`], [`meter`], [`api`], [`level`]: the real
 //!   programs, the network between them, and what they answer.
-//! * [`report`]: tables between markers in a page of text.
+//! * [`trial`]: a log played as a fleet into a fresh server, and what came of it.
+//! * [`evaluation`], [`speed`], [`report`]: `mapfold-evaluate`, which writes tables between markers
+//!   into a page of text.
 
 pub mod api;
 pub mod carmen;
 pub mod coverage;
 pub mod database;
 pub mod error;
+pub mod evaluation;
 pub mod fleet;
 pub mod floor;
+pub mod level;
 pub mod meter;
 pub mod plane;
 pub mod programs;
@@ -27,5 +31,7 @@ pub mod report;
 pub mod robot;
 pub mod server;
 pub mod simulation;
+pub mod speed;
+pub mod trial;
 
 pub use error::Error;

@@ -61,6 +61,7 @@ impl Robot {
     /// # Errors
     /// The program is not there.
     pub fn start(&self, target: &Target, folder: &Path) -> Result<Replay, Error> {
+        std::fs::create_dir_all(folder).map_err(|e| Error::file(folder, e))?;
         let output = folder.join(format!("{}.out", self.name));
         let file = std::fs::File::create(&output).map_err(|e| Error::file(&output, e))?;
         let errors = file.try_clone().map_err(|e| Error::file(&output, e))?;

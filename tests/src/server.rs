@@ -125,6 +125,31 @@ impl Server {
         }
     }
 
+    /// Runs another command of the program on the same data, and answers what it prints.
+    ///
+    /// # Errors
+    /// It fails.
+    pub async fn command(&self, arguments: &[&str]) -> Result<String, Error> {
+        let output = command(&self.folder, &self.database)?.args(arguments).output().await;
+        let output = output.map_err(|e| self.fault(&e.to_string()))?;
+        let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+        if !output.status.success() {
+            let complaint = String::from_utf8_lossy(&output.stderr).into_owned();
+            return Err(self.fault(&format!("{arguments:?} failed: {printed}{complaint}")));
+        }
+        Ok(printed)
+    }
+
+    /// `verify`: refolds the log from nothing, and answers the digest of the map.
+    ///
+    /// # Errors
+    /// What is stored is not what the log makes.
+    pub async fn verify(&self) -> Result<String, Error> {
+        let printed = self.command(&["verify"]).await?;
+        let digest = printed.trim().rsplit_once("; map ").map(|(_, digest)| digest.to_owned());
+        digest.ok_or_else(|| self.fault(&format!("verify prints no digest: {printed}")))
+    }
+
     async fn wait_until_ready(&mut self) -> Result<(), Error> {
         let api = self.api()?;
         let begin = tokio::time::Instant::now();
@@ -151,24 +176,28 @@ fn free_address() -> Result<String, Error> {
     address.map(|address| address.to_string()).map_err(|e| Error::file("127.0.0.1:0", e))
 }
 
+/// The program with its data, whatever it is to do.
+fn command(folder: &TempDir, database: &Database) -> Result<Command, Error> {
+    let mut command = Command::new(programs::path("mapfold-server")?);
+    command.arg("--data-dir").arg(folder.path().join("data")).stdin(Stdio::null());
+    if let Database::Postgres(url) = database {
+        command.args(["--database", url]);
+    }
+    Ok(command)
+}
+
 fn spawn(folder: &TempDir, database: &Database, listen: &str) -> Result<Child, Error> {
     let log = folder.path().join("server.log");
     let file = std::fs::OpenOptions::new().create(true).append(true).open(&log);
     let file = file.map_err(|e| Error::file(&log, e))?;
     let errors = file.try_clone().map_err(|e| Error::file(&log, e))?;
-    let mut command = Command::new(programs::path("mapfold-server")?);
+    let mut command = command(folder, database)?;
     command
-        .arg("serve")
-        .args(["--listen", listen, "--data-dir"])
-        .arg(folder.path().join("data"))
+        .args(["serve", "--listen", listen])
         .env("MAPFOLD_ADMIN_TOKEN", ADMIN_TOKEN)
-        .stdin(Stdio::null())
         .stdout(file)
         .stderr(errors)
         .kill_on_drop(true);
-    if let Database::Postgres(url) = database {
-        command.args(["--database", url]);
-    }
     command
         .spawn()
         .map_err(|e| Error::Program { program: "mapfold-server".to_owned(), fault: e.to_string() })

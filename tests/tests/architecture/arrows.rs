@@ -158,7 +158,10 @@ fn a_client_that_knows_the_server_is_found() {
             "client/Cargo.toml",
             "[dependencies]\nmapfold-map.workspace = true\nmapfold-server = { path = '../server' }",
         ),
-        ("server/Cargo.toml", "[target.'cfg(unix)'.dependencies]\nreqwest = '1'\n[dev-dependencies]\nindicatif = '1'"),
+        (
+            "server/Cargo.toml",
+            "[target.'cfg(unix)'.dependencies]\nreqwest = '1'\n[dev-dependencies]\nindicatif = '1'",
+        ),
         ("map/Cargo.toml", "[dependencies]\nwire = { package = 'serde', version = '1' }"),
         ("tools/Cargo.toml", ""),
     ]);

@@ -1,0 +1,68 @@
+//! `mapfold-evaluate`: measures what needs more data or time than the tests have, and rewrites the
+//! tables in a page of text.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use mapfold_tests::{Error, evaluation, speed};
+
+/// Measures Mapfold and rewrites the tables of a report between their markers.
+#[derive(Debug, Parser)]
+#[command(version)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Plays logs as fleets into real servers on SQLite and PostgreSQL and measures the maps
+    Maps {
+        /// The page with the markers `maps`
+        #[arg(long, value_name = "FILE")]
+        report: PathBuf,
+        /// A folder with further logs, in `logs/`; simulated worlds are played where there is none
+        #[arg(long, value_name = "DIR")]
+        data: Option<PathBuf>,
+        /// Only logs whose name contains this; the report is then left as it is
+        #[arg(long, value_name = "TEXT")]
+        only: Option<String>,
+    },
+    /// Gathers the figures that Criterion has left in the target folder
+    Benches {
+        /// The page with the markers `benches`
+        #[arg(long, value_name = "FILE")]
+        report: PathBuf,
+        /// Where Criterion leaves its figures
+        #[arg(long, value_name = "DIR", default_value = "target/criterion")]
+        criterion: PathBuf,
+    },
+}
+
+#[tokio::main]
+async fn main() -> ExitCode {
+    let done = match Arguments::parse().command {
+        Command::Maps { report, data, only } => {
+            evaluation::maps(&report, data.as_deref(), only.as_deref()).await
+        }
+        Command::Benches { report, criterion } => speed::benches(&report, &criterion),
+    };
+    match done {
+        Ok(faults) if faults.is_empty() => ExitCode::SUCCESS,
+        Ok(faults) => {
+            complain(&faults.join("\n"));
+            ExitCode::FAILURE
+        }
+        Err(error) => {
+            complain(&error.to_string());
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn complain(words: &str) {
+    use std::io::Write as _;
+    // Where nobody listens, the exit status still tells.
+    let _ = writeln!(std::io::stderr(), "mapfold-evaluate: {words}");
+}
