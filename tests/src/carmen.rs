@@ -71,15 +71,7 @@ impl Log {
     /// # Errors
     /// A file that cannot be read, a scan line that is too short or holds no numbers, no scans.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
-        let mut text = String::new();
-        let mut plain: &[u8] = &bytes;
-        if bytes.starts_with(&[0x1f, 0x8b]) {
-            GzDecoder::new(plain).read_to_string(&mut text)
-        } else {
-            plain.read_to_string(&mut text)
-        }
-        .map_err(|e| Error::file(path, e))?;
+        let text = text(path)?;
         let fault = |line: usize, fault: String| Error::Log { path: path.to_owned(), line, fault };
 
         let mut log =
@@ -134,6 +126,22 @@ impl Log {
             .and_then(|()| gzip.finish().map(drop))
             .map_err(|e| Error::file(path, e))
     }
+}
+
+/// The text of a log, gzip or plain.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn text(path: &Path) -> Result<String, Error> {
+    let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+    let mut text = String::new();
+    let mut plain: &[u8] = &bytes;
+    let read = if bytes.starts_with(&[0x1f, 0x8b]) {
+        GzDecoder::new(plain).read_to_string(&mut text)
+    } else {
+        plain.read_to_string(&mut text)
+    };
+    read.map(|_| text).map_err(|e| Error::file(path, e))
 }
 
 fn number(words: &[&str], at: usize) -> Result<f64, String> {

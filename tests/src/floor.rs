@@ -64,6 +64,11 @@ impl Floor {
         floor
     }
 
+    /// Edge of a cell, metres.
+    pub fn resolution_m(&self) -> f64 {
+        self.resolution_m
+    }
+
     /// The solid pieces of all segments.
     pub fn pieces(&self) -> &[Piece] {
         &self.pieces

@@ -38,7 +38,7 @@ const CRATES: &[CrateRule] = &[
     CrateRule { folder: "tests", may_know: &["map", "schema", "client", "server"], never: &[] },
 ];
 
-/// A module at the root of a crate and the others there that it may name.
+/// A module at the root of a crate and what else there it may name: modules, or items of modules.
 type ModuleRule = (&'static str, &'static [&'static str]);
 
 /// Everything at a crate's root; `lib` and `main` may name all of it.
@@ -48,8 +48,19 @@ const MODULES: &[(&str, &[ModuleRule])] = &[
         &[
             ("geometry", &[]),
             ("raster", &["geometry"]),
-            // A vector feature bears the names of the robots that saw it.
-            ("vector", &["geometry", "level"]),
+            // Features bear the identities that contributions give them; of the fold they know nothing.
+            (
+                "vector",
+                &[
+                    "geometry",
+                    "raster",
+                    "level::Contribution",
+                    "level::ContributionId",
+                    "level::FeatureId",
+                    "level::Provenance",
+                    "level::RobotName",
+                ],
+            ),
             ("level", &["geometry", "raster", "vector"]),
         ],
     ),
@@ -57,13 +68,72 @@ const MODULES: &[(&str, &[ModuleRule])] = &[
         "schema",
         &[
             ("slug", &[]),
+            ("instant", &[]),
             ("route", &[]),
-            ("codec", &[]),
-            ("v1", &[]),
-            ("border", &["v1", "slug"]),
-            ("problem", &["border"]),
+            ("v1", &["problem::Problem"]),
+            ("problem", &["border::Violation"]),
+            ("border", &["instant", "slug", "v1"]),
+            ("codec", &["border::Violation", "v1"]),
+            ("digest", &["codec", "v1"]),
+            ("openapi", &["border", "problem", "route", "v1"]),
+            ("malformed", &["border", "v1"]),
         ],
     ),
+    (
+        "client",
+        &[
+            ("sensor", &[]),
+            ("emulation", &["sensor"]),
+            ("evidence", &["sensor"]),
+            ("perception", &["sensor"]),
+            ("log", &["sensor"]),
+            ("sync", &[]),
+            ("geojson", &["perception"]),
+            ("robot", &["emulation", "evidence", "log", "perception", "sensor"]),
+            ("replay", &["log", "robot", "sensor", "sync"]),
+            ("cli", &["geojson", "log", "perception", "replay", "robot", "sensor", "sync"]),
+        ],
+    ),
+    (
+        "server",
+        &[
+            ("clock", &[]),
+            ("chance", &[]),
+            ("config", &["level::LevelOptions", "store::sqlite_url"]),
+            ("page", &[]),
+            ("exchange", &[]),
+            ("store", &[]),
+            ("auth", &["chance", "store"]),
+            ("level", &["clock", "store"]),
+            ("maintenance", &["level", "store"]),
+            ("http", &["auth", "chance", "clock", "config", "exchange", "level", "page", "store"]),
+            ("running", &["auth", "chance", "clock", "config", "http", "level", "store"]),
+            (
+                "cli",
+                &[
+                    "auth",
+                    "chance",
+                    "clock",
+                    "config",
+                    "exchange",
+                    "level",
+                    "maintenance",
+                    "running",
+                    "store",
+                ],
+            ),
+        ],
+    ),
+];
+
+/// Crates of others that a module must not name, because its subject is another.
+const FOREIGN: &[(&str, &[&str])] = &[
+    ("server/src/level", &["axum", "hyper", "sqlx", "tower", "tower_http", "utoipa"]),
+    ("server/src/store", &["axum", "hyper", "tower", "tower_http", "utoipa"]),
+    ("server/src/exchange", &["axum", "hyper", "sqlx", "tokio", "tower", "utoipa"]),
+    ("server/src/http", &["sqlx"]),
+    ("client/src/perception", &["reqwest", "serde_json", "tokio"]),
+    ("client/src/evidence", &["reqwest", "serde_json", "tokio"]),
 ];
 
 /// Violations among the manifests.
@@ -141,13 +211,40 @@ fn within_crate(sources: &Sources, folder: &str, rules: &[ModuleRule]) -> Vec<St
             else {
                 continue;
             };
-            if head != root && !may_name.contains(&head.as_str()) {
-                violations.push(format!("{path}: {root} must not know {}", named.join("::")));
+            let named = named.join("::");
+            let allows = |allowed: &&str| {
+                named
+                    .strip_prefix(*allowed)
+                    .is_some_and(|rest| rest.is_empty() || rest.starts_with("::"))
+            };
+            if head != root && !may_name.iter().any(allows) {
+                violations.push(format!("{path}: {root} must not know {named}"));
             }
         }
     }
     let gone = rules.iter().filter(|(name, _)| !seen.contains(*name));
     violations.extend(gone.map(|(name, _)| format!("{folder}: no module {name} any more")));
+    violations
+}
+
+/// Crates of others in places where they have no business.
+pub(crate) fn to_foreign_crates(sources: &Sources) -> Vec<String> {
+    foreign(sources, FOREIGN)
+}
+
+fn foreign(sources: &Sources, rules: &[(&str, &[&str])]) -> Vec<String> {
+    let mut violations = Vec::new();
+    for (folder, never) in rules {
+        let inside = format!("{folder}/");
+        let file = format!("{folder}.rs");
+        let of_folder = |path: &str| path == file || path.starts_with(&inside);
+        for (path, text) in sources.within(folder, ".rs").filter(|(path, _)| of_folder(path)) {
+            let named = paths::roots(text);
+            for name in never.iter().filter(|name| named.contains(**name)) {
+                violations.push(format!("{path}: must not name {name}"));
+            }
+        }
+    }
     violations
 }
 
@@ -194,5 +291,31 @@ fn an_arrow_that_points_up_is_found() {
             "x/src/new.rs: module new has no row in the table",
             "x: no module gone any more",
         ]
+    );
+}
+
+#[test]
+fn an_item_may_be_named_where_its_module_may_not() {
+    let rules: &[ModuleRule] = &[("low", &["high::Id"]), ("high", &["low"])];
+    let sources = Sources::of([
+        ("x/src/low.rs", "use crate::high::{Id, Idle, Act}; fn f() { crate::high::Id::new(); }"),
+        ("x/src/high.rs", ""),
+    ]);
+    assert_eq!(
+        within_crate(&sources, "x", rules),
+        ["x/src/low.rs: low must not know high::Idle", "x/src/low.rs: low must not know high::Act",]
+    );
+}
+
+#[test]
+fn a_foreign_crate_in_the_wrong_place_is_found() {
+    let sources = Sources::of([
+        ("server/src/level.rs", "use sqlx::Row;"),
+        ("server/src/level/fold.rs", "fn f() { let axum = 1; my::sqlx::f(); }"),
+        ("server/src/levels.rs", "use sqlx::Row;"),
+    ]);
+    assert_eq!(
+        foreign(&sources, &[("server/src/level", &["axum", "sqlx"])]),
+        ["server/src/level.rs: must not name sqlx"]
     );
 }

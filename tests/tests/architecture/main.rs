@@ -33,6 +33,11 @@ fn arrows_between_modules_point_down() {
 }
 
 #[test]
+fn modules_name_no_crate_that_is_not_their_business() {
+    assert_none("foreign crates", &arrows::to_foreign_crates(&repository()));
+}
+
+#[test]
 fn files_are_named_after_what_they_are() {
     assert_none("names", &tidy::names(&repository()));
 }

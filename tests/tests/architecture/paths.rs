@@ -1,6 +1,8 @@
 //! Which modules of its own crate a Rust file names: `crate::…` and `super::…` paths, in `use`
 //! trees and in expressions, with inline modules followed. A reader of words, not a parser of Rust.
 
+use std::collections::BTreeSet;
+
 /// Paths from the crate's root, each as its segments, in the order of the text.
 ///
 /// `module` is the file's own module path (`["level", "fold"]` for `src/level/fold.rs`).
@@ -38,6 +40,13 @@ pub(crate) fn named(source: &str, module: &[String]) -> Vec<Vec<String>> {
         at += 1;
     }
     found
+}
+
+/// The first words of all paths: crates, modules and types that are named with `::` behind them.
+pub(crate) fn roots(source: &str) -> BTreeSet<String> {
+    let words = words(source);
+    let firsts = (0..words.len()).filter(|at| starts_path(&words, *at));
+    firsts.map(|at| words[at].clone()).collect()
 }
 
 fn starts_path(words: &[String], at: usize) -> bool {
