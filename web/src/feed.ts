@@ -103,21 +103,24 @@ export function followLevel(options: FeedOptions): () => void {
     intervalMs: MAP_INTERVAL_MS,
     timers,
     run: async () => {
+      let fromStart = false;
       try {
         if (whole || state().level === null) await askLevel();
-        const fromStart = whole;
+        // From here on `whole` is about the next run: the level may turn out to be another meanwhile.
+        fromStart = whole;
+        whole = false;
         const { vectorRevision, rasterRevision } = state().content;
         const [patch, changes, robots] = await Promise.all([
           api.vector(place, fromStart ? 0 : vectorRevision, signal),
           api.raster(place, fromStart ? 0 : rasterRevision, signal),
           api.robots(place, signal),
         ]);
-        whole = false;
         failures = 0;
         dispatch({ kind: "robots", robots });
         dispatch({ kind: "vector", patch });
         dispatch({ kind: "raster", changes });
       } catch (error) {
+        whole ||= fromStart;
         if (error instanceof Refused && error.status === 410) {
           whole = true;
           map.request();

@@ -57,12 +57,17 @@ export function pictureBox({ z, row, col }: PictureAddress, cellM: number): Box 
   return [col * spanM, -(row + 1) * spanM, (col + 1) * spanM, -row * spanM];
 }
 
+/** The integer at or below a number; never a negative zero. */
+function floor(value: number): number {
+  return Math.floor(value) + 0;
+}
+
 /** The pictures that cover a box at one zoom level, row by row. */
 export function picturesOver(box: Box, z: number, cellM: number): PictureAddress[] {
   const spanM = PICTURE_PX * pictureResolution(z, cellM);
   const pictures: PictureAddress[] = [];
-  for (let row = Math.floor(-box[3] / spanM); row <= Math.ceil(-box[1] / spanM) - 1; row++) {
-    for (let col = Math.floor(box[0] / spanM); col <= Math.ceil(box[2] / spanM) - 1; col++) {
+  for (let row = floor(-box[3] / spanM); row <= Math.ceil(-box[1] / spanM) - 1; row++) {
+    for (let col = floor(box[0] / spanM); col <= Math.ceil(box[2] / spanM) - 1; col++) {
       pictures.push({ z, row, col });
     }
   }
@@ -75,8 +80,8 @@ export function picturesTouched(tile: TileAddress, z: number, tileCells: number)
   const pictures: PictureAddress[] = [];
   const rowLast = Math.ceil((-tile.y * tileCells) / pictureCells) - 1;
   const colLast = Math.ceil(((tile.x + 1) * tileCells) / pictureCells) - 1;
-  for (let row = Math.floor((-(tile.y + 1) * tileCells) / pictureCells); row <= rowLast; row++) {
-    for (let col = Math.floor((tile.x * tileCells) / pictureCells); col <= colLast; col++) {
+  for (let row = floor((-(tile.y + 1) * tileCells) / pictureCells); row <= rowLast; row++) {
+    for (let col = floor((tile.x * tileCells) / pictureCells); col <= colLast; col++) {
       pictures.push({ z, row, col });
     }
   }

@@ -1,0 +1,58 @@
+import { describe, expect, it } from "vitest";
+import { pick } from "../src/pick";
+import { update, type State } from "../src/state";
+import { after, cluster, ON_GROUND, segment, vectorPatch } from "./samples";
+
+/** The wall x = 2, y 1 to 4; another wall on the same line, y 10 to 12; a cluster; a robot at the origin. */
+const state: State = [
+  {
+    kind: "vector",
+    patch: vectorPatch(0, 1, {
+      segments: [segment("wall"), segment("far", { solid: [{ from_m: 10, to_m: 12, ends: ["jump", "jump"] }] })],
+      clusters: [cluster("thing")],
+    }),
+  } as const,
+].reduce(update, after(...ON_GROUND));
+const RESOLUTION = 0.05;
+
+describe("picking", () => {
+  it("finds the wall near the pointer, within eight pixels", () => {
+    expect(pick(state, [2.39, 2], RESOLUTION)).toEqual({ kind: "segment", id: "wall" });
+    expect(pick(state, [2.41, 2], RESOLUTION)).toBeNull();
+    expect(pick(state, [2, 4.3], RESOLUTION)).toEqual({ kind: "segment", id: "wall" });
+  });
+
+  it("does not take a wall for one that lies on the same line elsewhere", () => {
+    expect(pick(state, [2, 7], RESOLUTION)).toBeNull();
+    expect(pick(state, [2, 11], RESOLUTION)).toEqual({ kind: "segment", id: "far" });
+  });
+
+  it("takes the nearest of several", () => {
+    const both = update(state, {
+      kind: "vector",
+      patch: vectorPatch(1, 2, { segments: [segment("near", { rho_m: 2.2 })] }),
+    });
+    expect(pick(both, [2.15, 2], RESOLUTION)?.id).toBe("near");
+    expect(pick(both, [2.05, 2], RESOLUTION)?.id).toBe("wall");
+  });
+
+  it("finds a cluster from inside and from its edge", () => {
+    expect(pick(state, [5.5, 5.5], RESOLUTION)).toEqual({ kind: "cluster", id: "thing" });
+    expect(pick(state, [6.3, 5.5], RESOLUTION)).toEqual({ kind: "cluster", id: "thing" });
+    expect(pick(state, [6.5, 5.5], RESOLUTION)).toBeNull();
+  });
+
+  it("prefers robots to what is below them", () => {
+    const above = update(state, {
+      kind: "vector",
+      patch: vectorPatch(1, 2, { segments: [segment("under", { rho_m: 0, solid: [{ from_m: -3, to_m: 3, ends: ["jump", "jump"] }] })] }),
+    });
+    expect(pick(above, [0.1, 0], RESOLUTION)).toEqual({ kind: "robot", id: "ada" });
+    expect(pick(above, [0.1, 2], RESOLUTION)).toEqual({ kind: "segment", id: "under" });
+  });
+
+  it("finds nothing of what is not shown", () => {
+    const hidden = update(state, { kind: "layer", name: "segments", setting: { on: false } });
+    expect(pick(hidden, [2, 2], RESOLUTION)).toBeNull();
+  });
+});
