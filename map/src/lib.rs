@@ -10,6 +10,53 @@
 //! `level_from_robot` and reads like the product `a_from_c = a_from_b * b_from_c`; the state
 //! order is (x, y, heading).
 //!
+//! Two robots see one wall, from two places; the map has one segment that both support, and taking
+//! one of them out again leaves the map that the other would have made alone:
+//!
+//! ```
+//! use mapfold_map::geometry::{Covariance, Line, Pose, UncertainLine, UncertainPose};
+//! use mapfold_map::level::{Contribution, ContributionId, Level, LevelConfig, Provenance};
+//! use mapfold_map::vector::{EndKind, Facing, ObservedEnd, ObservedSegment};
+//!
+//! let look = |number: u8, robot: &str, x: f64| Contribution {
+//!     id: ContributionId([number; 16]),
+//!     robot: robot.into(),
+//!     observed_at_us: 0,
+//!     level_from_robot: UncertainPose {
+//!         pose: Pose::new(x, 1.0, 0.0),
+//!         covariance: Covariance::from_variances([4e-4, 4e-4, 1e-5]),
+//!     },
+//!     provenance: Provenance::SharedMap,
+//!     segments: vec![ObservedSegment {
+//!         // The wall y = 3 is 2 m to the left of a robot at y = 1 that looks along x.
+//!         line: UncertainLine {
+//!             line: Line::normal_form(2.0, std::f64::consts::FRAC_PI_2).0,
+//!             covariance: Covariance::from_variances([1e-4, 1e-5]),
+//!         },
+//!         from: -1.5,
+//!         to: 1.5,
+//!         facing: Facing::Origin,
+//!         ends: [ObservedEnd { kind: EndKind::Occluded, sd: 0.02 }; 2],
+//!         points: 60,
+//!     }],
+//!     clusters: vec![],
+//!     evidence: vec![],
+//! };
+//! let (ada, bob) = (look(1, "ada", 4.0), look(2, "bob", 5.0));
+//!
+//! let mut level = Level::new(LevelConfig::standard(0.05));
+//! level.fold([&bob, &ada]);
+//! let segment = level.map().segments.values().next().expect("one wall");
+//! assert_eq!(segment.looks, 2);
+//! assert!((segment.line.rho() - 3.0).abs() < 1e-9);
+//! assert_eq!(segment.solid[0].span.length(), 4000);
+//!
+//! level.unfold([&ada]);
+//! let mut alone = Level::new(LevelConfig::standard(0.05));
+//! alone.fold([&bob]);
+//! assert_eq!(level.map(), alone.map());
+//! ```
+//!
 //! * [`geometry`]: angles, covariances, poses, supporting lines, intervals, hulls.
 //! * [`vector`]: observed segments and clusters, and the walls they fuse into.
 //! * [`raster`]: integer log-odds evidence and the tiles it adds up in.

@@ -109,3 +109,12 @@ proptest! {
         prop_assert!((before - after).abs() <= 1e-9 * before.max(1.0));
     }
 }
+
+#[test]
+fn what_overflows_on_the_way_is_refused() {
+    for huge in [f64::MAX, 1e308] {
+        assert!(Covariance::new(Matrix2::new(huge, 0.0, 0.0, 1.0)).is_err());
+        assert!(Covariance::new(Matrix2::new(1.0, huge, huge, 1.0)).is_err());
+        assert!(Covariance::new(Matrix3::from_element(huge)).is_err());
+    }
+}

@@ -24,12 +24,18 @@ pub struct VectorConfig {
     pub datum_heading_sd: f64,
     /// Cells below this many nats of scanner evidence count as free.
     pub free_below: f64,
+    /// Scanner evidence that one look gives for a free cell, nats (positive).
+    pub free_look: f64,
+    /// A wall is seen through where more than this share of the looks at it went through it.
+    pub through_share: f64,
     /// A wall is seen through where this much of it in a row lies in free cells only, metres.
     pub seen_through_min: f64,
     /// Shorter pieces are not published, metres.
     pub length_min: f64,
     /// Parts of two walls that are not further apart than this are one wall seen twice, metres.
     pub duplicate_offset: f64,
+    /// Opposite faces that are not further apart than this may be those of one wall, metres.
+    pub thickness_max: f64,
     /// Two clusters are one if their hulls are not further apart than this, metres, plus three
     /// standard deviations of their places.
     pub cluster_gap: f64,
@@ -50,9 +56,12 @@ impl VectorConfig {
         datum_position_sd: 0.01,
         datum_heading_sd: 0.001,
         free_below: -1.0,
-        seen_through_min: 0.15,
+        free_look: 0.4,
+        through_share: 0.25,
+        seen_through_min: 0.10,
         length_min: 0.2,
         duplicate_offset: 0.12,
+        thickness_max: 0.30,
         cluster_gap: 0.10,
         cluster_gap_max: 0.30,
     };

@@ -34,21 +34,31 @@ impl<E: Evidence> Reader<'_, E> {
     }
 }
 
-/// Cells to either side of a line that have to be free as well for the line to be seen through
-/// there: a wall may lie a cell off its estimate.
-const CELLS_ACROSS: i32 = 1;
+/// Cells to either side of a line that have to be free as well for the line to lie in free space:
+/// a wall may lie a cell off its estimate.
+const CELLS_BESIDE: i32 = 1;
+/// Cells behind a line that only beams through it reach: hits smear their evidence less deep.
+const CELLS_BEHIND: [i32; 2] = [2, 3];
 
-/// The parts of `pieces` (ascending, disjoint) that scanners have looked through: stretches of at
-/// least `config.seen_through_min` on which all cells on and beside the line are free.
+/// The parts of `pieces` (ascending, disjoint) that scanners have looked through. Two things
+/// count, sample by sample:
+/// * the cells on and beside the line are all free, or
+/// * the cells just behind it are free by more looks than a share (`config.through_share`) of those
+///   that saw the wall there, not counting the looks at another face close behind it (`backs`),
+///   whose viewers freed those cells.
+///
+/// Single samples inside a piece are noise; ends are trimmed sample by sample.
 pub(super) fn seen_through<E: Evidence>(
     wall: &Wall,
     pieces: &[Interval],
+    backs: &[&Wall],
     grid: &E,
     config: &VectorConfig,
 ) -> Vec<Interval> {
     let resolution = grid.resolution();
     let free_below = LogOdds::from_nat(config.free_below).0;
-    let across = wall.towards_free() * resolution;
+    let one_look = LogOdds::from_nat(config.free_look).0.max(1);
+    let towards_free = wall.towards_free() * resolution;
     let step = ((resolution * 1e3).round() as i64).max(1);
     let least = (config.seen_through_min * 1e3).round() as i64;
     let mut reader = Reader { grid, tile: None };
@@ -58,10 +68,19 @@ pub(super) fn seen_through<E: Evidence>(
         // Samples sit on multiples of the step, so that they do not move when the piece grows.
         let mut at = piece.from.div_euclid(step) * step;
         while at < piece.to {
-            let p = wall.line.at((at as f64 + 0.5 * step as f64) * 1e-3);
-            let free = (-CELLS_ACROSS..=CELLS_ACROSS)
-                .all(|k| reader.value(&(p + across * f64::from(k))) < free_below);
-            match (free, open) {
+            let middle = at + step / 2;
+            let p = wall.line.at(middle as f64 * 1e-3);
+            let mut value = |cells: i32| reader.value(&(p + towards_free * f64::from(cells)));
+            let lies_in_free_space =
+                (-CELLS_BESIDE..=CELLS_BESIDE).all(|cells| value(cells) < free_below);
+            let seen = lies_in_free_space || {
+                let behind = CELLS_BEHIND.iter().map(|cells| value(-cells)).max().unwrap_or(0);
+                let through = f64::from(-behind.min(0)) / f64::from(one_look);
+                let others = || backs.iter().map(|back| back.looks_beside(&p)).sum::<i64>() as f64;
+                let allowed = config.through_share * wall.looks_at(middle) as f64;
+                through > allowed && through - others() > allowed
+            };
+            match (seen, open) {
                 (true, None) => open = Some(at),
                 (false, Some(from)) => {
                     through.push(Interval { from, to: at });
@@ -74,8 +93,8 @@ pub(super) fn seen_through<E: Evidence>(
         if let Some(from) = open {
             through.push(Interval { from, to: at });
         }
+        through.retain(|i| i.length() >= least || i.from <= piece.from || i.to >= piece.to);
     }
-    through.retain(|i| i.length() >= least);
     through
 }
 

@@ -17,6 +17,8 @@ pub(super) struct Wall {
     pub(super) facing: Facing,
     /// What was seen of it, ascending, disjoint, millimetres along `line`.
     pub(super) seen: Vec<Interval>,
+    /// From where on how many looks cover it, ascending: millimetres along `line`, count.
+    covers: Vec<(i64, i64)>,
     /// Where looks ended, and how: millimetres along `line`.
     ends: Vec<(i64, EndKind)>,
     pub(super) looks: u32,
@@ -40,13 +42,16 @@ impl Wall {
         let fused = fuse(group.clone(), leader, config)?;
         let (line, independent, dependent, facing) = in_level_frame(&fused);
         let mut seen = Vec::new();
+        let mut covers = Vec::new();
         let mut ends = Vec::new();
         let mut robots = Vec::new();
         let mut last_look = None;
         let (mut looks, mut first_seen_us, mut last_seen_us) = (0, i64::MAX, i64::MIN);
         for (id, sighting) in group {
             let [a, b] = sighting.end_points().map(|p| line.along(&p));
-            seen.push(Interval::from_metres(a, b));
+            let span = Interval::from_metres(a, b);
+            seen.push(span);
+            covers.extend([(span.from, 1), (span.to, -1)]);
             ends.push(((a * 1e3).round() as i64, sighting.ends[0].kind));
             ends.push(((b * 1e3).round() as i64, sighting.ends[1].kind));
             if last_look != Some(id.contribution) {
@@ -60,6 +65,12 @@ impl Wall {
         robots.sort_unstable();
         robots.dedup();
         ends.sort_unstable();
+        covers.sort_unstable();
+        let mut count = 0;
+        for (_, change) in &mut covers {
+            count += *change;
+            *change = count;
+        }
         let seen = union_intervals(&seen, BRIDGE_MM);
         Some(Self {
             line,
@@ -67,6 +78,7 @@ impl Wall {
             dependent,
             facing,
             seen,
+            covers,
             ends,
             looks,
             robots,
@@ -90,6 +102,29 @@ impl Wall {
             Facing::Origin => -n,
             Facing::Away => n,
         }
+    }
+
+    /// How many observations cover the wall at `at` millimetres.
+    pub(super) fn looks_at(&self, at: i64) -> i64 {
+        let next = self.covers.partition_point(|(from, _)| *from <= at);
+        next.checked_sub(1).map_or(0, |i| self.covers[i].1)
+    }
+
+    /// How many observations cover the wall abreast of `p`.
+    pub(super) fn looks_beside(&self, p: &Point) -> i64 {
+        self.looks_at((self.line.along(p) * 1e3).round() as i64)
+    }
+
+    /// Whether `other` may be the other face of this wall: it faces the opposite side and lies not
+    /// further than `config.thickness_max` behind.
+    pub(super) fn is_backed_by(&self, other: &Self, config: &VectorConfig) -> bool {
+        let free = self.towards_free();
+        let behind = |i: &Interval| {
+            let p = other.line.at(0.5 * (i.from_m() + i.to_m()));
+            let depth = free.dot(&(self.line.at(self.line.along(&p)) - p));
+            (-config.duplicate_offset..=config.thickness_max).contains(&depth)
+        };
+        free.dot(&other.towards_free()) < -config.angle_max.cos() && other.seen.iter().any(behind)
     }
 
     /// What is known of the wall's end at `at` millimetres: a corner rather than a physical end rather

@@ -98,9 +98,7 @@ impl Walls {
                 }
             }
             unpublished.remove(&old.rank);
-            if published.contains_key(&id) {
-                self.unpublish_later(&old.wall, old.rank, unpublished);
-            }
+            self.unpublish_near(&old.wall, unpublished);
         }
         let made = self.sightings.get(id).and_then(|(leader, rank)| {
             let group: Vec<(FeatureId, &Sighting)> = self.sightings.group(id)?.collect();
@@ -113,6 +111,7 @@ impl Walls {
                 for tile in &tiles {
                     self.by_tile.entry(*tile).or_default().insert(id);
                 }
+                self.unpublish_near(&wall, unpublished);
                 self.placed.insert(id, Placed { wall, rank, tiles });
                 unpublished.insert(rank);
             }
@@ -124,7 +123,13 @@ impl Walls {
         }
     }
 
-    /// Later walls near `wall` have to be published anew.
+    /// All walls near `wall` have to be published anew: it may be their other face.
+    fn unpublish_near(&self, wall: &Wall, unpublished: &mut BTreeSet<Rank>) {
+        let near = self.places.near(reach(wall));
+        unpublished.extend(near.iter().filter_map(|id| Some(self.placed.get(id)?.rank)));
+    }
+
+    /// Later walls near `wall` have to be published anew: it may publish what they saw too.
     fn unpublish_later(&self, wall: &Wall, rank: Rank, unpublished: &mut BTreeSet<Rank>) {
         for id in self.places.near(reach(wall)) {
             if let Some(other) = self.placed.get(&id)
@@ -167,13 +172,23 @@ impl Walls {
         config: &VectorConfig,
     ) -> Option<Segment> {
         let wall = &placed.wall;
-        let mut pieces =
-            subtract_intervals(&wall.seen, &seen_through(wall, &wall.seen, grid, config));
-        for id in self.places.near(reach(wall)) {
-            let (Some(other), Some(segment)) = (self.placed.get(&id), published.get(&id)) else {
-                continue;
-            };
-            if other.rank < placed.rank {
+        let neighbours: Vec<(FeatureId, &Placed)> = self
+            .places
+            .near(reach(wall))
+            .into_iter()
+            .filter_map(|id| Some((id, self.placed.get(&id)?)))
+            .collect();
+        let backs: Vec<&Wall> = neighbours
+            .iter()
+            .map(|(_, other)| &other.wall)
+            .filter(|other| wall.is_backed_by(other, config))
+            .collect();
+        let through = seen_through(wall, &wall.seen, &backs, grid, config);
+        let mut pieces = subtract_intervals(&wall.seen, &through);
+        for (id, other) in neighbours {
+            if other.rank < placed.rank
+                && let Some(segment) = published.get(&id)
+            {
                 let theirs = segment.solid.iter().map(|s| s.span);
                 let twice = wall.duplicated(&pieces, &other.wall, theirs, config);
                 pieces = subtract_intervals(&pieces, &twice);

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use mapfold_map::geometry::{Covariance, Point, Pose, UncertainPose};
 use mapfold_map::level::{Contribution, Level, LevelConfig, Provenance};
 use mapfold_map::raster::{Cell, EvidencePatch, SensorClass, TILE_CELLS, TilePatch};
-use mapfold_map::vector::Segment;
+use mapfold_map::vector::{Segment, solid_length};
 
 use crate::world::{Chance, NOISE, Noise, id, looks, observe};
 
@@ -77,17 +77,17 @@ fn a_wall_through_the_origin_of_the_level_is_one_wall() {
     assert_eq!(only(&folded(&looks)).looks, 6);
 }
 
-/// Free evidence in all cells of a strip across the wall y = 3, from x0 to x1.
-fn strip(number: u64, x0: f64, x1: f64, class: SensorClass) -> Contribution {
+/// A look that saw no wall, only gave `steps` of evidence to the cells from x0 to x1 and y0 to y1.
+fn area(number: u64, x: [f64; 2], y: [f64; 2], steps: i16, class: SensorClass) -> Contribution {
     let mut cells: BTreeMap<_, Box<[i16; TILE_CELLS]>> = BTreeMap::new();
-    let (mut x, step) = (x0 + 0.025, 0.05);
-    while x < x1 {
-        for row in 0..20 {
-            let p = Point::new(x, 2.5 + 0.025 + 0.05 * f64::from(row));
+    let count = |[from, to]: [f64; 2]| ((to - from) / 0.05).round() as i32;
+    for column in 0..count(x) {
+        for row in 0..count(y) {
+            let centre = |from: f64, i: i32| from + 0.025 + 0.05 * f64::from(i);
+            let p = Point::new(centre(x[0], column), centre(y[0], row));
             let (tile, offset) = Cell::holding(&p, 0.05).tile();
-            cells.entry(tile).or_insert_with(|| Box::new([0; TILE_CELLS]))[offset] = -200;
+            cells.entry(tile).or_insert_with(|| Box::new([0; TILE_CELLS]))[offset] = steps;
         }
-        x += step;
     }
     let tiles = cells.into_iter().map(|(t, c)| (t, TilePatch::from_cells(&c))).collect();
     Contribution {
@@ -100,8 +100,10 @@ fn strip(number: u64, x0: f64, x1: f64, class: SensorClass) -> Contribution {
 #[test]
 fn a_doorway_that_robots_look_through_is_open_and_closes_when_the_evidence_is_taken_out() {
     let wall = (Point::new(1.0, 3.0), Point::new(5.0, 3.0));
-    let looks =
-        [look(0, &[wall], Point::new(3.0, 1.0), EXACT), strip(1, 2.0, 2.9, SensorClass::Scanner)];
+    let looks = [
+        look(0, &[wall], Point::new(3.0, 1.0), EXACT),
+        area(1, [2.0, 2.9], [2.5, 3.5], -200, SensorClass::Scanner),
+    ];
     let mut level = folded(&looks);
     let segment = only(&level).clone();
     assert_eq!(segment.solid.len(), 2);
@@ -116,9 +118,39 @@ fn sonar_alone_opens_no_wall() {
     let wall = (Point::new(1.0, 3.0), Point::new(5.0, 3.0));
     let level = folded(&[
         look(0, &[wall], Point::new(3.0, 1.0), EXACT),
-        strip(1, 2.0, 2.9, SensorClass::Sonar),
+        area(1, [2.0, 2.9], [2.5, 3.5], -200, SensorClass::Sonar),
     ]);
     assert_eq!(only(&level).solid.len(), 1);
+}
+
+/// A wall along y = 3 with hits from four looks, and free evidence behind it from `through` more.
+fn looked_through(through: u64) -> Vec<Contribution> {
+    let wall = (Point::new(1.0, 3.0), Point::new(5.0, 3.0));
+    let scanner = SensorClass::Scanner;
+    let hits = (0..4).map(|i| look(i, &[wall], Point::new(3.0, 1.0), EXACT));
+    let marked = (4..8).map(|i| area(i, [1.0, 5.0], [2.95, 3.05], 85, scanner));
+    let freed = (8..8 + through).map(|i| area(i, [2.0, 3.0], [3.05, 3.5], -40, scanner));
+    hits.chain(marked).chain(freed).collect()
+}
+
+#[test]
+fn what_many_looks_went_through_is_open_although_others_hit_it() {
+    let gap = |looks: &[Contribution]| 4000 - solid(&folded(looks));
+    assert_eq!(gap(&looked_through(1)) / 100, 0, "one look of five may err");
+    assert!((gap(&looked_through(2)) - 1000).abs() <= 100);
+}
+
+#[test]
+fn free_space_behind_a_thin_partition_is_that_of_its_other_face() {
+    let back = (Point::new(5.0, 3.05), Point::new(1.0, 3.05));
+    let mut looks = looked_through(3);
+    looks.extend((20..23).map(|i| look(i, &[back], Point::new(3.0, 5.0), EXACT)));
+    assert!((solid(&folded(&looks)) - 8000).abs() < 200);
+}
+
+/// Total length of what is published, millimetres.
+fn solid(level: &Level) -> i64 {
+    (solid_length(&level.map().segments) * 1e3).round() as i64
 }
 
 #[test]
