@@ -3,8 +3,9 @@
 //! In CBOR, UUIDs are byte strings of 16 and fractional numbers are floats of any width (never
 //! integers); all else is as in JSON.
 
-use serde::Serialize;
-use serde::de::{DeserializeOwned, IgnoredAny};
+use serde::de::{DeserializeOwned, IgnoredAny, SeqAccess, Visitor};
+use serde::{Deserializer as _, Serialize};
+use serde_json::value::RawValue;
 
 use crate::border::Violation;
 use crate::v1;
@@ -13,6 +14,9 @@ use crate::v1;
 pub const JSON: &str = "application/json";
 /// Media type of CBOR.
 pub const CBOR: &str = "application/cbor";
+
+/// The byte that ends a CBOR array of unknown length.
+const CBOR_BREAK: u8 = 0xff;
 
 /// Longest piece of a body that an error repeats, bytes.
 const ECHO_LENGTH_MAX: usize = 512;
@@ -107,6 +111,71 @@ pub fn decode_uploads(
         (Format::Cbor, false) => vec![from_cbor(bytes)?],
     };
     Ok((uploads, is_array))
+}
+
+/// Takes an array apart into its elements, still encoded, so that each can be read for itself and
+/// one that does not fit spoils none of the others. Elements beyond the first `max` and one more
+/// are left out.
+///
+/// # Errors
+/// Another media type; what is not an array, or not well-formed.
+pub fn split_array<'a>(
+    media_type: &str,
+    bytes: &'a [u8],
+    max: usize,
+) -> Result<Vec<&'a [u8]>, DecodeError> {
+    match Format::of(media_type) {
+        Some(Format::Json) => split_json(bytes, max),
+        Some(Format::Cbor) => split_cbor(bytes, max).map_err(|e| DecodeError::Cbor(e.to_string())),
+        None => Err(DecodeError::MediaType(media_type.to_owned())),
+    }
+}
+
+fn split_json(bytes: &[u8], max: usize) -> Result<Vec<&[u8]>, DecodeError> {
+    /// Keeps the first `max` elements and one more.
+    struct AtMost {
+        max: usize,
+    }
+    impl<'de> Visitor<'de> for AtMost {
+        type Value = Vec<&'de RawValue>;
+
+        fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+            f.write_str("an array")
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, mut array: A) -> Result<Self::Value, A::Error> {
+            let mut elements = Vec::new();
+            while elements.len() <= self.max
+                && let Some(element) = array.next_element()?
+            {
+                elements.push(element);
+            }
+            while array.next_element::<IgnoredAny>()?.is_some() {}
+            Ok(elements)
+        }
+    }
+    let mut deserializer = serde_json::Deserializer::from_slice(bytes);
+    let elements = deserializer.deserialize_seq(AtMost { max });
+    let whole = elements.and_then(|elements| deserializer.end().map(|()| elements));
+    let elements = whole.map_err(|error| DecodeError::Json(error.to_string()))?;
+    Ok(elements.into_iter().map(|element| element.get().as_bytes()).collect())
+}
+
+fn split_cbor(bytes: &[u8], max: usize) -> Result<Vec<&[u8]>, minicbor_serde::error::DecodeError> {
+    let mut deserializer = minicbor_serde::Deserializer::new(bytes);
+    let decoder = deserializer.decoder_mut();
+    let length = decoder.array()?;
+    let mut elements = Vec::new();
+    // An array may be of unknown length; a break then ends it.
+    while elements.len() <= max
+        && length.is_none_or(|length| (elements.len() as u64) < length)
+        && (length.is_some() || bytes.get(decoder.position()) != Some(&CBOR_BREAK))
+    {
+        let start = decoder.position();
+        decoder.skip()?;
+        elements.push(&bytes[start..decoder.position()]);
+    }
+    Ok(elements)
 }
 
 /// Writes JSON.

@@ -180,6 +180,33 @@ fn a_fault_in_a_batch_is_found_at_its_place() {
 }
 
 #[test]
+fn a_batch_can_be_taken_apart_so_that_one_fault_spoils_one_element() {
+    let body = serde_json::json!([example(), {"nonsense": [1, [2]]}, example()]);
+    let json = serde_json::to_vec(&body).unwrap();
+    let item = codec::to_cbor(&example()).unwrap();
+    let known_length = [&[0x82], item.as_slice(), &[0x19, 1, 0]].concat();
+    let unknown_length = [&[0x9f], item.as_slice(), &[0x80, 0xff]].concat();
+
+    let split = codec::split_array(codec::JSON, &json, 64).unwrap();
+    assert_eq!(split.len(), 3);
+    assert_eq!(codec::from_json::<v1::Contribution>(split[2]), Ok(example()));
+    assert_eq!(split[1], br#"{"nonsense":[1,[2]]}"#);
+    for body in [&known_length, &unknown_length] {
+        let split = codec::split_array(codec::CBOR, body, 64).unwrap();
+        assert_eq!(split.len(), 2);
+        assert_eq!(codec::from_cbor::<v1::Contribution>(split[0]), Ok(example()));
+    }
+    assert_eq!(codec::split_array(codec::JSON, b"[1,2,3,4,5]", 2).unwrap(), [b"1", b"2", b"3"]);
+    assert_eq!(codec::split_array(codec::CBOR, &[0x84, 1, 2, 3, 4], 2).unwrap().len(), 3);
+    for bad in [b"{}".as_slice(), b"[1,", b"[1] 2", b"7"] {
+        assert!(matches!(codec::split_array(codec::JSON, bad, 2), Err(DecodeError::Json(_))));
+    }
+    for bad in [[0x82, 1].as_slice(), &[0x9f, 1], &[0xa0], &[]] {
+        assert!(matches!(codec::split_array(codec::CBOR, bad, 2), Err(DecodeError::Cbor(_))));
+    }
+}
+
+#[test]
 fn certainty_below_the_floor_buys_nothing() {
     let claim = |factor: f64| {
         let mut contribution = example();
@@ -246,4 +273,22 @@ fn a_contribution_of_only_a_pose_is_valid() {
     contribution.evidence.clear();
     let checked = check_contribution(&contribution, &target()).unwrap();
     assert!(checked.segments.is_empty() && checked.evidence.is_empty());
+}
+
+#[test]
+fn a_tile_lies_within_the_level_with_its_far_edge_too() {
+    let accepted = |x: i32, coordinate_max_m: f64| {
+        let mut target = target();
+        target.limits.coordinate_max_m = coordinate_max_m;
+        let mut contribution = example();
+        contribution.evidence[0].tiles.truncate(1);
+        contribution.evidence[0].tiles[0].x = x;
+        check_contribution(&contribution, &target).is_ok()
+    };
+    // A tile is 64 cells of 0.05 m, so ten of them reach to 32 m.
+    assert!(accepted(9, 32.0) && accepted(-10, 32.0));
+    assert!(!accepted(10, 32.0) && !accepted(-11, 32.0));
+    // Whatever a site allows, the numbers of cells must fit.
+    assert!(accepted(1 << 24, 1e12));
+    assert!(!accepted(i32::MAX, 1e12) && !accepted(i32::MIN, 1e12));
 }
