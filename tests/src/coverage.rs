@@ -7,7 +7,9 @@ use crate::plane::Piece;
 /// A return counts as explained if something of the map lies this near.
 pub const NEAR_M: f64 = 0.10;
 
-/// A beam counts as running through a wall if it goes on behind it for longer than this.
+/// A beam counts as running through a wall if it ends farther than this behind it, square to the
+/// wall: a beam that grazes a wall goes on for longer along itself when the wall is known to a
+/// centimetre, so that is counted beside it.
 pub const THROUGH_M: f64 = 0.20;
 
 /// Counts over the returns of a log. Beams without return say nothing here and are not counted.
@@ -18,8 +20,11 @@ pub struct Coverage {
     /// Of them, those whose end lies within [`NEAR_M`] of a segment, a cluster's hull or an
     /// occupied cell.
     pub explained: u64,
-    /// Of them, those that cross a published segment and go on for more than [`THROUGH_M`].
+    /// Of them, those that cross a published segment and end more than [`THROUGH_M`] behind it.
     pub through: u64,
+    /// Of them, those that cross a published segment and go on along themselves for more than
+    /// [`THROUGH_M`].
+    pub through_along: u64,
 }
 
 impl Coverage {
@@ -32,6 +37,11 @@ impl Coverage {
     pub fn through_share(&self) -> f64 {
         self.through as f64 / self.returns.max(1) as f64
     }
+
+    /// The same, with what is behind measured along the beams.
+    pub fn through_along_share(&self) -> f64 {
+        self.through_along as f64 / self.returns.max(1) as f64
+    }
 }
 
 /// Measures a map against all scans of a log, at the log's corrected poses.
@@ -42,7 +52,9 @@ pub fn measure(floor: &Floor, log: &Log) -> Coverage {
             let beam = Piece { a: scan.origin, b: end };
             coverage.returns += 1;
             coverage.explained += u64::from(floor.is_near(end, NEAR_M));
-            coverage.through += u64::from(floor.is_run_through(&beam, THROUGH_M));
+            let behind = floor.behind(&beam);
+            coverage.through += u64::from(behind.across_m > THROUGH_M);
+            coverage.through_along += u64::from(behind.along_m > THROUGH_M);
         }
     }
     coverage
@@ -82,9 +94,9 @@ mod tests {
         std::fs::write(&path, format!("PARAM robot_front_laser_max 20\n{line}")).expect("a log");
         let log = Log::read(&path).expect("a readable log");
         let whole = measure(&Floor::new(&[wall(5.0)], &[], &[], 0.05, NEAR_M), &log);
-        assert_eq!(whole, Coverage { returns: 3, explained: 1, through: 1 });
+        assert_eq!(whole, Coverage { returns: 3, explained: 1, through: 1, through_along: 1 });
         let short = measure(&Floor::new(&[wall(-1.0)], &[], &[], 0.05, NEAR_M), &log);
-        assert_eq!(short, Coverage { returns: 3, explained: 0, through: 0 });
+        assert_eq!(short, Coverage { returns: 3, explained: 0, through: 0, through_along: 0 });
         assert!((whole.explained_share() - 1.0 / 3.0).abs() < 1e-12);
     }
 }

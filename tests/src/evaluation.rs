@@ -97,7 +97,7 @@ fn faults_of(name: &str, outcomes: &[Outcome]) -> Vec<String> {
     faults
 }
 
-const HEADER: [&str; 12] = [
+const HEADER: [&str; 13] = [
     "log",
     "engine",
     "scans",
@@ -110,6 +110,7 @@ const HEADER: [&str; 12] = [
     "GeoJSON kB",
     "explained %",
     "through %",
+    "along %",
 ];
 
 fn row(name: &str, log: &Log, outcome: &Outcome) -> Vec<String> {
@@ -128,6 +129,7 @@ fn row(name: &str, log: &Log, outcome: &Outcome) -> Vec<String> {
         (outcome.exports.first().map_or(0, Vec::len) / 1000).to_string(),
         format!("{:.2}", 100.0 * coverage.explained_share()),
         format!("{:.2}", 100.0 * coverage.through_share()),
+        format!("{:.2}", 100.0 * coverage.through_along_share()),
     ]
 }
 

@@ -109,25 +109,39 @@ impl Floor {
         self.tiles.get(&tile).map_or(0, |sums| sums[offset as usize])
     }
 
-    /// Whether a beam crosses a piece and goes on behind it for more than `slack_m`.
-    pub fn is_run_through(&self, beam: &Piece, slack_m: f64) -> bool {
+    /// How far a beam goes on behind the pieces that it crosses: the farthest of them.
+    pub fn behind(&self, beam: &Piece) -> Behind {
         let length = beam.length();
-        let behind = |index: usize| {
-            let crossing = beam.crossing(&self.pieces[index]);
-            crossing.is_some_and(|share| (1.0 - share) * length > slack_m)
-        };
+        let mut behind = Behind::default();
         // Half a bin a step, and every bin reaches half a bin farther than its square: no piece
         // that the beam crosses is missed.
         let steps = (length / (0.5 * BIN_M)).ceil().max(1.0) as usize;
-        (0..=steps).any(|step| {
+        for step in 0..=steps {
             let share = step as f64 / steps as f64;
             let at = Point::new(
                 beam.a.x + share * (beam.b.x - beam.a.x),
                 beam.a.y + share * (beam.b.y - beam.a.y),
             );
-            self.piece_bins.at(at).any(behind)
-        })
+            for index in self.piece_bins.at(at) {
+                let piece = &self.pieces[index];
+                if let Some(share) = beam.crossing(piece) {
+                    behind.along_m = behind.along_m.max((1.0 - share) * length);
+                    behind.across_m = behind.across_m.max(piece.distance_from_line(beam.b));
+                }
+            }
+        }
+        behind
     }
+}
+
+/// How far a beam goes on behind walls.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Behind {
+    /// Along the beam, metres. A beam that grazes a wall runs far along it for an error of
+    /// a few centimetres across.
+    pub along_m: f64,
+    /// Square to the wall, metres.
+    pub across_m: f64,
 }
 
 /// The solid parts of a segment as pieces: `from_m` and `to_m` run from the foot point of the
@@ -237,10 +251,13 @@ mod tests {
     fn a_beam_runs_through_a_wall_only_if_it_goes_on_behind_it() {
         let floor = Floor::new(&[wall(30.0)], &[], &[], 0.05, 0.1);
         let beam = |top: f64| Piece { a: Point::new(29.0, -20.0), b: Point::new(29.0, top) };
-        assert!(floor.is_run_through(&beam(2.3), 0.2));
-        assert!(!floor.is_run_through(&beam(2.1), 0.2));
-        assert!(!floor.is_run_through(&beam(1.9), 0.2));
+        assert!((floor.behind(&beam(2.3)).across_m - 0.3).abs() < 1e-9);
+        assert!((floor.behind(&beam(2.3)).along_m - 0.3).abs() < 1e-9);
+        assert_eq!(floor.behind(&beam(1.9)), Behind::default());
         let past = Piece { a: Point::new(31.0, 0.0), b: Point::new(31.0, 9.0) };
-        assert!(!floor.is_run_through(&past, 0.2));
+        assert_eq!(floor.behind(&past), Behind::default());
+        let grazing = Piece { a: Point::new(26.0, 1.9), b: Point::new(29.0, 2.1) };
+        let behind = floor.behind(&grazing);
+        assert!((behind.across_m - 0.1).abs() < 1e-9 && behind.along_m > 1.5);
     }
 }
