@@ -143,11 +143,11 @@ impl Folder {
             Ok((folding, progress))
         })
         .await?;
-        self.publish(&folding, progress);
+        self.publish(&folding, &progress);
         Ok(folding)
     }
 
-    fn publish(&self, folding: &Folding, progress: Progress) {
+    fn publish(&self, folding: &Folding, progress: &Progress) {
         let head = self.head.fetch_max(folding.revision(), Ordering::AcqRel);
         let snapshot = Arc::new(Snapshot::of(folding, head));
         metrics::gauge!(

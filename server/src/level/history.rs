@@ -94,6 +94,13 @@ impl<K: Least, V: PartialEq> History<K, V> {
         self.things.iter().filter_map(|(key, dated)| Some((key, dated.value.as_ref()?)))
     }
 
+    /// The things from `first` to `last` that are, by key.
+    pub(super) fn live_between(&self, first: K, last: K) -> impl Iterator<Item = (&K, &Arc<V>)> {
+        self.things
+            .range((Bound::Included(first), Bound::Included(last)))
+            .filter_map(|(key, dated)| Some((key, dated.value.as_ref()?)))
+    }
+
     /// A thing, if it is or ever was, and the revision of its last change.
     pub(super) fn get(&self, key: &K) -> Option<(i64, Option<&Arc<V>>)> {
         self.things.get(key).map(|dated| (dated.revision, dated.value.as_ref()))
@@ -179,7 +186,9 @@ impl MapHistory {
             limit: usize,
             to: &mut Vec<i64>,
         ) {
-            to.extend(history.changed(since, i64::MAX).take(limit + 1).map(|(r, ..)| r));
+            to.extend(
+                history.changed(since, i64::MAX).take(limit.saturating_add(1)).map(|(r, ..)| r),
+            );
         }
         let mut changed = Vec::new();
         revisions(&self.segments, since, limit, &mut changed);

@@ -234,6 +234,10 @@ pub(super) async fn aside<T: Send + 'static>(
     }
 }
 
-fn spoilt(table: &'static str, key: impl Into<String>, detail: impl ToString) -> StoreError {
+fn spoilt(
+    table: &'static str,
+    key: impl Into<String>,
+    detail: impl std::fmt::Display,
+) -> StoreError {
     StoreError::Corrupt { table, key: key.into(), detail: detail.to_string() }
 }

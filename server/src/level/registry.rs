@@ -47,7 +47,7 @@ impl Default for LevelOptions {
             write_behind_interval: Duration::from_secs(2),
             write_behind_revisions: 500,
             poll_interval: Duration::from_secs(1),
-            idle_close: Duration::from_secs(300),
+            idle_close: Duration::from_mins(5),
             event_capacity: 256,
         }
     }

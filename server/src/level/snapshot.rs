@@ -97,6 +97,15 @@ impl Snapshot {
         self.history.tiles.live()
     }
 
+    /// The tiles from `first` to `last`, by layer and place.
+    pub fn tiles_between(
+        &self,
+        first: TileKey,
+        last: TileKey,
+    ) -> impl Iterator<Item = (&TileKey, &Arc<Tile>)> {
+        self.history.tiles.live_between(first, last)
+    }
+
     /// One tile and the revision at which it last changed; a tile that is no more (or never was)
     /// is `None`.
     pub fn tile(&self, key: &TileKey) -> Option<(i64, &Arc<Tile>)> {

@@ -5,6 +5,7 @@
 //! same map because the fold is a function of the set.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 
 use mapfold_map::level::{Level, LevelConfig};
 use mapfold_schema::border::Target;
@@ -95,6 +96,8 @@ struct Check {
     stepwise: Folding,
     reversed: Level,
     read: i64,
+    /// Revision of the last row that was read.
+    last: i64,
     faults: Vec<String>,
 }
 
@@ -106,6 +109,7 @@ impl Check {
             stepwise: Folding::empty(row.resolution_m),
             reversed: Level::new(LevelConfig::standard(row.resolution_m)),
             read: 0,
+            last: 0,
             faults: Vec::new(),
         };
         if check.stored.folded_revision == 0 {
@@ -127,8 +131,14 @@ impl Check {
             self.read += 1;
             match self.recall(row) {
                 Ok(contribution) => logged.push(contribution),
+                // Revisions of rows that cannot be read are passed over below, as if held.
                 Err(fault) => self.fault(format!("revision {}: {fault}", row.revision)),
             }
+            if row.revision != self.last + 1 {
+                let (from, to) = (self.last + 1, row.revision - 1);
+                self.fault(format!("the log has no revision {from} (and on to {to})"));
+            }
+            self.last = row.revision;
         }
         // The stored map may end within the page: the ways must meet there.
         let (until, rest): (Vec<Logged>, Vec<Logged>) =
@@ -140,6 +150,7 @@ impl Check {
             let in_force = piece.iter().rev().filter(|logged| logged.in_force());
             self.reversed.fold(in_force.map(|logged| &*logged.contribution));
             for logged in &piece {
+                self.stepwise.pass_over_until(logged.revision);
                 if let Err(gap) = self.stepwise.step(logged) {
                     self.fault(gap.to_string());
                 }
@@ -210,7 +221,7 @@ impl Check {
 
     fn report(mut self, row: &LevelRow) -> Report {
         self.compare_ways();
-        let revision = self.stepwise.revision();
+        let revision = self.last;
         if revision < row.revision {
             self.fault(format!("the log ends at revision {revision}, not {}", row.revision));
         }
@@ -268,5 +279,9 @@ fn map_digest(folding: &Folding) -> Result<String, StoreError> {
         let cells: Vec<u8> = tile.cells().iter().flat_map(|cell| cell.to_le_bytes()).collect();
         add("tile", &format!("{:?}/{}/{}", key.class, key.tile.x, key.tile.y), &cells);
     }
-    Ok(digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
+    let mut hex = String::new();
+    for byte in digest.finalize() {
+        let _ = write!(hex, "{byte:02x}"); // writing to a String cannot fail
+    }
+    Ok(hex)
 }

@@ -135,61 +135,50 @@ impl Store {
         level: &str,
         batch: &[NewContribution],
     ) -> Result<Vec<Appended>, StoreError> {
-        let mut answers: Vec<Option<Appended>> = vec![None; batch.len()];
-        // The first of each id; later ones of the same id are answered as if they came later.
-        let mut first_of: BTreeMap<Uuid, usize> = BTreeMap::new();
-        for (i, contribution) in batch.iter().enumerate() {
-            first_of.entry(contribution.id).or_insert(i);
-        }
-        let mut fresh: Vec<usize> = first_of.values().copied().collect();
-        fresh.sort_unstable();
-        while !fresh.is_empty() {
+        let mut answers: BTreeMap<usize, Appended> = BTreeMap::new();
+        let mut standing: BTreeMap<Uuid, Standing> = BTreeMap::new();
+        let mut pending: Vec<usize> = (0..batch.len()).collect();
+        // Each turn answers one at least, or learns of one that stands in the log.
+        loop {
+            pending.retain(|i| match standing.get(&batch[*i].id) {
+                Some(standing) => {
+                    answers.insert(*i, standing.answer(&batch[*i].digest));
+                    false
+                }
+                None => true,
+            });
+            let mut ids: BTreeSet<Uuid> = BTreeSet::new();
+            let fresh: Vec<usize> =
+                pending.iter().copied().filter(|i| ids.insert(batch[*i].id)).collect();
+            if fresh.is_empty() {
+                return Ok(answers.into_values().collect());
+            }
             let rows: Vec<&NewContribution> = fresh.iter().map(|i| &batch[*i]).collect();
             match retried("append", || self.try_append(site, level, &rows)).await? {
                 Attempt::Committed(places) => {
-                    for (i, place) in fresh.drain(..).zip(places) {
-                        answers[i] = Some(Appended::New(place));
+                    for (i, place) in fresh.into_iter().zip(places) {
+                        answers.insert(i, Appended::New(place));
+                        let NewContribution { id, digest, .. } = &batch[i];
+                        standing.insert(*id, Standing { place, digest: digest.clone() });
                     }
+                    pending.retain(|i| !answers.contains_key(i));
                 }
-                Attempt::UnknownRobots(unknown) => {
-                    for i in &fresh {
-                        if unknown.contains(&batch[*i].robot) {
-                            answers[*i] = Some(Appended::UnknownRobot);
-                        }
+                Attempt::UnknownRobots(unknown) => pending.retain(|i| {
+                    let known = !unknown.contains(&batch[*i].robot);
+                    if !known {
+                        answers.insert(*i, Appended::UnknownRobot);
                     }
-                }
+                    known
+                }),
                 Attempt::Collided => {
                     let known = self.known(site, level, &rows).await?;
                     if known.is_empty() {
-                        return Err(corrupt(
-                            TABLE,
-                            level,
-                            "a row that is not there was in the way",
-                        ));
+                        return Err(corrupt(TABLE, level, "what is not there was in the way"));
                     }
-                    for i in &fresh {
-                        if let Some(standing) = known.get(&batch[*i].id) {
-                            answers[*i] = Some(standing.answer(&batch[*i].digest));
-                        }
-                    }
+                    standing.extend(known);
                 }
             }
-            // Each turn answers one at least, so this ends.
-            fresh.retain(|i| answers[*i].is_none());
         }
-        Ok((0..batch.len())
-            .map(|i| {
-                let first = first_of.get(&batch[i].id).copied().unwrap_or(i);
-                match answers[first].unwrap_or(Appended::UnknownRobot) {
-                    answer if first == i => answer,
-                    Appended::New(place) | Appended::Known(place) => {
-                        let digest = batch[first].digest.clone();
-                        Standing { place, digest }.answer(&batch[i].digest)
-                    }
-                    answer => answer,
-                }
-            })
-            .collect())
     }
 
     async fn try_append(

@@ -1,5 +1,6 @@
 //! Opening an engine, and refusing one that could lose or spoil what was acknowledged.
 
+use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Duration;
 
@@ -28,7 +29,7 @@ pub fn sqlite_url(file: &Path) -> String {
         if byte.is_ascii_alphanumeric() || b"/-._~".contains(&byte) {
             url.push(char::from(byte));
         } else {
-            url.push_str(&format!("%{byte:02X}"));
+            let _ = write!(url, "%{byte:02X}"); // writing to a String cannot fail
         }
     }
     url

@@ -77,12 +77,11 @@ impl From<sqlx::Error> for StoreError {
             }
         });
         match cause {
-            None => Self::Unavailable(error),
+            None | Some(Cause::Away) => Self::Unavailable(error),
             Some(Cause::DiskFull) => Self::DiskFull,
             Some(Cause::ReadOnly) => Self::ReadOnly,
             Some(Cause::DiskFailed) => Self::DiskFailed(error.to_string()),
             Some(Cause::Busy) => Self::Busy(error),
-            Some(Cause::Away) => Self::Unavailable(error),
             Some(Cause::Spoilt) => Self::Corrupt {
                 table: "database file",
                 key: "a page".to_owned(),

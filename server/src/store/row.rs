@@ -21,7 +21,7 @@ where
 pub(super) fn corrupt(
     table: &'static str,
     key: impl Into<String>,
-    detail: impl ToString,
+    detail: impl std::fmt::Display,
 ) -> StoreError {
     StoreError::Corrupt { table, key: key.into(), detail: detail.to_string() }
 }

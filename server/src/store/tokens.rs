@@ -125,8 +125,9 @@ impl TryFrom<&AnyRow> for TokenRow {
         Ok(Self {
             id: get(row, TABLE, "token")?,
             secret_sha256: secret
+                .as_slice()
                 .try_into()
-                .map_err(|_: Vec<u8>| corrupt(TABLE, "secret_sha256", "not 32 bytes"))?,
+                .map_err(|e| corrupt(TABLE, "secret_sha256", e))?,
             site: get(row, TABLE, "site")?,
             robot: get(row, TABLE, "robot")?,
             scopes: serde_json::from_str(&scopes).map_err(|e| corrupt(TABLE, "scopes", e))?,
