@@ -15,7 +15,19 @@ export default defineConfig({
     proxy: { "/api": process.env["MAPFOLD_URL"] ?? "http://127.0.0.1:7171" },
   },
   test: {
-    environment: "node",
-    include: ["test/*.test.ts"],
+    projects: [
+      { test: { name: "unit", environment: "node", include: ["test/*.test.ts"] } },
+      // Needs `dist/` and Chromium; one at a time, as rendering without a GPU takes a processor each.
+      {
+        test: {
+          name: "browser",
+          environment: "node",
+          include: ["test/browser/*.test.ts"],
+          fileParallelism: false,
+          testTimeout: 60_000,
+          hookTimeout: 60_000,
+        },
+      },
+    ],
   },
 });

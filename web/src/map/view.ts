@@ -149,6 +149,7 @@ export function createMapView(options: MapViewOptions): MapView {
   /** What the page itself has last set; anything else is the operator's doing. */
   let applied: { centre: Point; resolution: number } | null = null;
   let fitted: Box | null = null;
+  let drawnView: State["view"] | null = null;
 
   const centre = (): Point => {
     const [x = 0, y = 0] = view.getCenter() ?? [];
@@ -197,7 +198,8 @@ export function createMapView(options: MapViewOptions): MapView {
       return;
     }
     fitted = null;
-    if (state.view === before.view) return;
+    if (state.view === drawnView) return;
+    drawnView = state.view;
     const { xLevelM, yLevelM, resolution: wanted } = state.view;
     applied = { centre: [xLevelM, yLevelM], resolution: wanted };
     if (isApplied()) return;

@@ -69,7 +69,8 @@ export function createMockServer({ nowMs = Date.now, noSites = false } = {}) {
       const cookie = `mapfold_session=${MOCK_TOKEN}; HttpOnly; SameSite=Strict; Path=/`;
       return json({ id: "mock", scopes: ["admin"], site: null, robot: null, expires_at: null }, { "set-cookie": cookie });
     }
-    if (!signedIn || !(request.headers.cookie ?? "").includes(`mapfold_session=${MOCK_TOKEN}`)) {
+    const bySession = signedIn && (request.headers.cookie ?? "").includes(`mapfold_session=${MOCK_TOKEN}`);
+    if (!bySession && request.headers.authorization !== `Bearer ${MOCK_TOKEN}`) {
       return problem(401, "Sign in first.");
     }
     if (path === "/session" && request.method === "DELETE") {

@@ -1,0 +1,345 @@
+// The built page in Chromium, against a made-up server.
+
+import type { Browser, Page } from "playwright-core";
+import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, it } from "vitest";
+import { launchBrowser } from "../../e2e/browser.mjs";
+import { createMockServer, MOCK_TOKEN } from "../mock/server.mjs";
+
+type Mock = ReturnType<typeof createMockServer>;
+
+let browser: Browser;
+let mock: Mock;
+let origin: string;
+let page: Page;
+/** What a browser complains about: script errors, console errors, refusals by the page's policy. */
+let complaints: string[];
+/** Requests that left this machine. */
+let strays: string[];
+
+beforeAll(async () => {
+  browser = await launchBrowser();
+});
+afterAll(async () => {
+  await browser.close();
+});
+beforeEach(async () => {
+  mock = createMockServer();
+  origin = await mock.listen();
+  mock.step(12);
+});
+afterEach(async () => {
+  await page.context().close();
+  await mock.close();
+});
+
+async function open(hash: string, options: { width?: number; height?: number } = {}): Promise<void> {
+  const context = await browser.newContext({ viewport: { width: options.width ?? 1280, height: options.height ?? 800 } });
+  page = await context.newPage();
+  complaints = [];
+  strays = [];
+  page.on("console", (message) => {
+    if (message.type() === "error" || message.type() === "warning") complaints.push(message.text());
+  });
+  page.on("pageerror", (error) => complaints.push(error.message));
+  page.on("request", (request) => {
+    if (!request.url().startsWith(origin) && !request.url().startsWith("blob:")) strays.push(request.url());
+  });
+  await page.goto(`${origin}/${hash}`);
+}
+
+const SIGNED_IN = `#token=${MOCK_TOKEN}`;
+
+/** A fact of the root element's `data-` attributes. */
+async function fact(name: string): Promise<string | undefined> {
+  return page.evaluate((key) => document.documentElement.dataset[key], name);
+}
+
+async function until(name: string, value: string | number): Promise<void> {
+  await page.waitForFunction(([key, wanted]) => document.documentElement.dataset[key] === wanted, [name, String(value)] as const);
+}
+
+/** The page shows all that the server has. */
+async function caughtUp(): Promise<void> {
+  await until("revision", mock.ground.revision());
+  await until("tilesPending", 0);
+}
+
+/** Pixels of a layer's canvas that have about this colour. */
+async function pixels(layer: string, hex: string): Promise<number> {
+  return page.evaluate(
+    ([name, colour]) => {
+      const canvas = document.querySelector<HTMLCanvasElement>(`.painter-${name}`);
+      const context = canvas?.getContext("2d");
+      if (!canvas || !context) return 0;
+      const wanted = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
+      const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
+      let count = 0;
+      for (let i = 0; i < data.length; i += 4) {
+        const far = wanted.some((value, channel) => Math.abs((data[i + channel] ?? 0) - value) > 24);
+        if (!far && (data[i + 3] ?? 0) > 200) count++;
+      }
+      return count;
+    },
+    [layer, hex] as const,
+  );
+}
+
+describe("signing in", () => {
+  it("with a token in the address leads to the map, and the token leaves the address", async () => {
+    await open(`${SIGNED_IN}&site=plant&level=ground`);
+    await caughtUp();
+    expect(page.url()).not.toContain(MOCK_TOKEN);
+    expect(page.url()).toContain("#site=plant&level=ground");
+    expect(await fact("live")).toBe("live");
+    expect(complaints).toEqual([]);
+    expect(strays).toEqual([]);
+  });
+
+  it("asks for a token, says when it is wrong, and goes on when it is right", async () => {
+    await open("");
+    await until("session", "out");
+    await page.fill("#token", "wrong");
+    await page.keyboard.press("Enter");
+    await page.waitForSelector("text=does not know this token");
+    await page.fill("#token", MOCK_TOKEN);
+    await page.keyboard.press("Enter");
+    await caughtUp();
+    await page.reload();
+    await caughtUp();
+    await page.click("text=Sign out");
+    await until("session", "out");
+    expect(await page.isVisible("#token")).toBe(true);
+  });
+
+  it("is asked for again when the session ends", async () => {
+    await open(SIGNED_IN);
+    await caughtUp();
+    mock.endSessions();
+    mock.step();
+    await page.waitForSelector("text=Your session has ended");
+  });
+});
+
+describe("the map", () => {
+  it("shows segments, clusters, robots and occupancy", async () => {
+    await open(SIGNED_IN);
+    await caughtUp();
+    const { segments, clusters, tiles } = mock.ground.describe().counts;
+    expect(await fact("segments")).toBe(String(segments));
+    expect(await fact("clusters")).toBe(String(clusters));
+    expect(await fact("tiles")).toBe(String(tiles));
+    expect(await fact("robots")).toBe("3");
+    expect(Number(await fact("tilesLoaded"))).toBeGreaterThan(0);
+    // Ada's, Bruno's and Sina's colours.
+    for (const colour of ["#0072b2", "#d55e00", "#aa3377"]) expect(await pixels("segments", colour)).toBeGreaterThan(50);
+    expect(await pixels("robots", "#0072b2")).toBeGreaterThan(50);
+    expect(await pixels("raster", "#ffffff")).toBeGreaterThan(1000);
+    expect(await page.textContent(".robots")).toContain("sonar (emulated)");
+    expect(await page.textContent(".contributions")).toContain("Sina");
+  });
+
+  it("follows what robots do within two seconds, without loading anew", async () => {
+    await open(SIGNED_IN);
+    await caughtUp();
+    await page.evaluate(() => {
+      document.body.dataset["untouched"] = "yes";
+    });
+    const delaysMs: number[] = [];
+    for (let i = 0; i < 5; i++) {
+      const startMs = performance.now();
+      mock.step();
+      await until("revision", mock.ground.revision());
+      delaysMs.push(performance.now() - startMs);
+    }
+    expect(delaysMs.sort((a, b) => a - b)[2]).toBeLessThan(2_000);
+    await caughtUp();
+    expect(await page.evaluate(() => document.body.dataset["untouched"])).toBe("yes");
+    await page.waitForSelector(`.contributions >> text=#${mock.ground.revision()}`);
+    expect(complaints).toEqual([]);
+  });
+
+  it("fetches only the pictures that a change touches", async () => {
+    await open(SIGNED_IN);
+    await caughtUp();
+    const pictures = (): string[] => mock.requests.filter((request) => request.includes("/tiles/"));
+    const before = pictures();
+    const all = new Set(before).size;
+    expect(all).toBeGreaterThan(6);
+    // Sina's sonars reach four metres.
+    mock.tell("revision", mock.ground.look("sina"));
+    await caughtUp();
+    const after = pictures().slice(before.length);
+    expect(after.length).toBeGreaterThan(0);
+    expect(new Set(after).size).toBeLessThan(all / 2);
+  });
+
+  it("never blanks a picture while its successor is on the way", async () => {
+    await open(SIGNED_IN);
+    await caughtUp();
+    const shown = await pixels("raster", "#ffffff");
+    await page.route("**/tiles/**", async (route) => {
+      await new Promise((resolve) => setTimeout(resolve, 700));
+      await route.continue();
+    });
+    mock.step();
+    await until("revision", mock.ground.revision());
+    expect(Number(await fact("tilesPending"))).toBeGreaterThan(0);
+    expect(await pixels("raster", "#ffffff")).toBeGreaterThan(shown * 0.95);
+    await caughtUp();
+    await page.unroute("**/tiles/**");
+  });
+
+  it("forgets what was taken out", async () => {
+    await open(SIGNED_IN);
+    await caughtUp();
+    const [first] = mock.ground.vector(0).segments;
+    const before = Number(await fact("segments"));
+    mock.tell("revision", mock.ground.remove(first?.id ?? ""));
+    await caughtUp();
+    expect(await fact("segments")).toBe(String(before - 1));
+  });
+});
+
+describe("the operator", () => {
+  /** Where a point of the level is on the screen, from the permalink's view. */
+  const at = async (xLevelM: number, yLevelM: number): Promise<readonly [number, number]> => {
+    const fields = new URLSearchParams(new URL(page.url()).hash.slice(1));
+    const box = await page.locator("#map").boundingBox();
+    const [x, y, resolution] = ["x", "y", "resolution"].map((name) => Number(fields.get(name)));
+    const middle = [(box?.x ?? 0) + (box?.width ?? 0) / 2, (box?.y ?? 0) + (box?.height ?? 0) / 2] as const;
+    return [middle[0] + (xLevelM - (x ?? 0)) / (resolution ?? 1), middle[1] - (yLevelM - (y ?? 0)) / (resolution ?? 1)];
+  };
+  const IN_HALL = `${SIGNED_IN}&site=plant&level=ground&x=30&y=3&resolution=0.04`;
+
+  it("chooses a segment and reads how good it is", async () => {
+    await open(IN_HALL);
+    await caughtUp();
+    // The corridor's south wall y = 0, between two doorways.
+    await page.mouse.click(...(await at(30, 0)));
+    const card = page.locator(".selection");
+    await card.waitFor();
+    const text = await card.innerText();
+    for (const word of ["Segment", "Quality", "Seen by", "Offset sd", "Angle sd", "First seen", "Last seen"]) {
+      expect(text).toContain(word);
+    }
+    await page.keyboard.press("Escape");
+    await card.waitFor({ state: "hidden" });
+  });
+
+  it("sees where the pointer is, in metres", async () => {
+    await open(IN_HALL);
+    await caughtUp();
+    await page.mouse.move(...(await at(28.5, 1.25)));
+    await page.waitForFunction(() => document.querySelector(".pointer")?.textContent === "x 28.50 m   y 1.25 m");
+    expect(await page.textContent(".scale")).toContain("5 m");
+  });
+
+  it("shares what is shown by its address", async () => {
+    await open(IN_HALL);
+    await caughtUp();
+    await page.uncheck("#layer-clusters");
+    await page.locator("[aria-label='Opacity of Occupancy']").fill("40");
+    await page.selectOption("[aria-label='Sensors whose evidence is shown']", "sonar");
+    await page.mouse.move(400, 400);
+    await page.mouse.down();
+    await page.mouse.move(300, 350, { steps: 5 });
+    await page.mouse.up();
+    await page.waitForFunction(() => !window.location.hash.includes("x=30.00"));
+    await caughtUp();
+    const address = page.url();
+    expect(address).toContain("layers=raster:40,segments,robots&evidence=sonar");
+    await page.reload();
+    await caughtUp();
+    expect(page.url()).toBe(address);
+    expect(await page.isChecked("#layer-clusters")).toBe(false);
+    expect(await page.evaluate(() => document.querySelector<HTMLElement>(".painter-raster")?.style.opacity)).toBe("0.4");
+    expect(mock.requests.at(-1)).not.toContain("layer=all");
+  });
+
+  it("can do with the keyboard alone", async () => {
+    await open(IN_HALL);
+    await caughtUp();
+    await page.focus("#map");
+    await page.keyboard.press("ArrowRight");
+    await page.waitForFunction(() => !window.location.hash.includes("x=30.00"));
+    await page.keyboard.press("g");
+    await page.waitForFunction(() => window.location.hash.includes("grid"));
+    await page.keyboard.press("f");
+    await page.waitForFunction(() => !window.location.hash.includes("x="));
+    expect(await page.getAttribute(".tools button:nth-child(3)", "aria-pressed")).toBe("true");
+  });
+
+  it("goes to a robot from the list", async () => {
+    await open(SIGNED_IN);
+    await caughtUp();
+    await page.click(".robots button:has-text('Bruno')");
+    const pose = mock.ground.robots().find((robot) => robot.robot === "bruno")?.last_pose;
+    await page.waitForFunction((x) => window.location.hash.includes(`x=${x}`), (pose?.x_m ?? 0).toFixed(2));
+    expect(await page.textContent(".selection")).toContain("SICK LMS200, up to 15 m");
+  });
+
+  it("has all of it on a tablet too", async () => {
+    await open(SIGNED_IN, { width: 800, height: 1100 });
+    await caughtUp();
+    expect(await page.isVisible("#panels")).toBe(false);
+    await page.click(".panels-toggle");
+    expect(await page.isVisible("#panels")).toBe(true);
+    const wide = await page.evaluate(() => document.documentElement.scrollWidth);
+    expect(wide).toBeLessThanOrEqual(800);
+  });
+});
+
+describe("in words", () => {
+  it("tells of a level that is empty, and draws it once a robot comes", async () => {
+    await open(`${SIGNED_IN}&site=plant&level=upper`);
+    await page.waitForSelector("text=Nothing here yet");
+    expect(await page.textContent(".notice pre")).toContain("--level upper");
+    await page.selectOption("#level", "ground");
+    await caughtUp();
+    expect(await page.isVisible(".notice")).toBe(false);
+  });
+
+  it("tells how to make a site", async () => {
+    await mock.close();
+    mock = createMockServer({ noSites: true });
+    origin = await mock.listen();
+    await open(SIGNED_IN);
+    await page.waitForSelector("text=No site yet");
+    expect(await page.textContent(".notice pre")).toContain(`mapfold-robot replay LOG --server ${origin}`);
+  });
+
+  it("tells that the server is gone, and goes on by itself when it is back", async () => {
+    await open(SIGNED_IN);
+    await caughtUp();
+    await page.route("**/api/**", (route) => route.abort());
+    mock.dropStreams();
+    await until("live", "lost");
+    await page.waitForSelector("text=The server cannot be reached");
+    expect(Number(await fact("segments"))).toBeGreaterThan(0);
+    mock.step(2);
+    await page.unroute("**/api/**");
+    await until("live", "live");
+    await caughtUp();
+    expect(await page.isVisible(".warning")).toBe(false);
+  });
+
+  it("tells that the server cannot be reached from the start", async () => {
+    await open("");
+    await until("session", "out");
+    await page.route("**/api/**", (route) => route.abort());
+    await page.reload();
+    await page.waitForSelector("text=The server cannot be reached");
+    await page.unroute("**/api/**");
+    await page.click("text=Try again");
+    await until("session", "out");
+  });
+
+  it("shows a level that was replaced as it is now", async () => {
+    await open(SIGNED_IN);
+    await caughtUp();
+    mock.ground.replace();
+    mock.step();
+    await caughtUp();
+    await until("segments", mock.ground.describe().counts.segments);
+  });
+});
