@@ -71,7 +71,7 @@ impl Robot {
             .args(["--server", &target.url, "--token", &target.token])
             .args(["--site", &target.site, "--level", &target.level])
             .args(["--robot", &self.name, "--create"])
-            .arg("--state-dir")
+            .arg("--outbox")
             .arg(folder.join(&self.name))
             .args(&self.options)
             .stdin(Stdio::null())
