@@ -126,7 +126,7 @@ pub fn split_array<'a>(
 ) -> Result<Vec<&'a [u8]>, DecodeError> {
     match Format::of(media_type) {
         Some(Format::Json) => split_json(bytes, max),
-        Some(Format::Cbor) => split_cbor(bytes, max).map_err(|e| DecodeError::Cbor(e.to_string())),
+        Some(Format::Cbor) => split_cbor(bytes, max),
         None => Err(DecodeError::MediaType(media_type.to_owned())),
     }
 }
@@ -161,19 +161,25 @@ fn split_json(bytes: &[u8], max: usize) -> Result<Vec<&[u8]>, DecodeError> {
     Ok(elements.into_iter().map(|element| element.get().as_bytes()).collect())
 }
 
-fn split_cbor(bytes: &[u8], max: usize) -> Result<Vec<&[u8]>, minicbor_serde::error::DecodeError> {
+fn split_cbor(bytes: &[u8], max: usize) -> Result<Vec<&[u8]>, DecodeError> {
+    let malformed = |error: &dyn ToString| DecodeError::Cbor(error.to_string());
     let mut deserializer = minicbor_serde::Deserializer::new(bytes);
     let decoder = deserializer.decoder_mut();
-    let length = decoder.array()?;
+    let length = decoder.array().map_err(|e| malformed(&e))?;
     let mut elements = Vec::new();
     // An array may be of unknown length; a break then ends it.
-    while elements.len() <= max
-        && length.is_none_or(|length| (elements.len() as u64) < length)
-        && (length.is_some() || bytes.get(decoder.position()) != Some(&CBOR_BREAK))
-    {
+    let ended = |elements: &Vec<&[u8]>, position: usize| match length {
+        Some(length) => elements.len() as u64 >= length,
+        None => bytes.get(position) == Some(&CBOR_BREAK),
+    };
+    while elements.len() <= max && !ended(&elements, decoder.position()) {
         let start = decoder.position();
-        decoder.skip()?;
+        decoder.skip().map_err(|e| malformed(&e))?;
         elements.push(&bytes[start..decoder.position()]);
+    }
+    let end = decoder.position() + usize::from(length.is_none());
+    if elements.len() <= max && end != bytes.len() {
+        return Err(malformed(&"bytes follow the array"));
     }
     Ok(elements)
 }

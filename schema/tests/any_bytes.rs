@@ -19,6 +19,9 @@ fn read_as_everything(bytes: &[u8]) {
                 let _ = check_contribution(upload, &target());
             }
         }
+        for element in codec::split_array(media_type, bytes, 3).unwrap_or_default() {
+            let _ = codec::decode::<v1::Contribution>(media_type, element);
+        }
         if let Ok(patch) = codec::decode::<v1::Patch>(media_type, bytes) {
             let _ = map_patch(&patch);
         }

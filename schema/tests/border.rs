@@ -201,7 +201,7 @@ fn a_batch_can_be_taken_apart_so_that_one_fault_spoils_one_element() {
     for bad in [b"{}".as_slice(), b"[1,", b"[1] 2", b"7"] {
         assert!(matches!(codec::split_array(codec::JSON, bad, 2), Err(DecodeError::Json(_))));
     }
-    for bad in [[0x82, 1].as_slice(), &[0x9f, 1], &[0xa0], &[]] {
+    for bad in [[0x82, 1].as_slice(), &[0x9f, 1], &[0xa0], &[], &[0x81, 1, 1], &[0x9f, 0xff, 1]] {
         assert!(matches!(codec::split_array(codec::CBOR, bad, 2), Err(DecodeError::Cbor(_))));
     }
 }
