@@ -1,0 +1,422 @@
+//! A local copy of a level, kept up to date by patches and kept on disk between runs.
+//!
+//! Patches are applied with the map's own code and compute nothing, so the copy equals the
+//! server's map bit for bit. A server that was set back to an older backup, or a level that was
+//! made anew, is noticed by its revision or its frame; the mirror then begins again from nothing
+//! and says so.
+
+mod file;
+mod geojson;
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use mapfold_map::level::{LevelMap, apply};
+use mapfold_schema::border::{Violation, map_patch};
+use mapfold_schema::codec::EncodeError;
+use mapfold_schema::v1;
+use rand::Rng;
+use tokio::sync::watch;
+use tokio::task::spawn_blocking;
+use tokio::time::{Instant, sleep};
+use uuid::Uuid;
+
+use file::{Saved, Unusable};
+
+use super::durable::{self, DiskError};
+use super::{Api, ApiError, Backoff, BackoffConfig, LevelAddress};
+
+/// How to keep a mirror up to date.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MirrorConfig {
+    /// About how many things to ask for at a time.
+    pub page_limit: u32,
+    /// Waits between tries of [`Mirror::follow`].
+    pub backoff: BackoffConfig,
+    /// How often [`Mirror::follow`] writes the mirror to disk at most. After a crash it goes on
+    /// from what was written last.
+    pub save_interval: Duration,
+}
+
+impl MirrorConfig {
+    /// Pages of 2000 things, on disk every ten seconds.
+    pub const STANDARD: Self = Self {
+        page_limit: 2000,
+        backoff: BackoffConfig::QUICK,
+        save_interval: Duration::from_secs(10),
+    };
+}
+
+/// Why a mirror began again from nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ResyncReason {
+    /// The level was made anew: its frame is another.
+    OtherFrame,
+    /// The server's log ends before the mirror's revision: it was set back to an older backup.
+    ServerWentBack,
+    /// The file on disk was damaged; it lies beside the new one as `level.mirror.damaged`.
+    DamagedFile,
+}
+
+/// What a refresh did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Refreshed {
+    /// The revision before.
+    pub from_revision: i64,
+    /// The revision now.
+    pub to_revision: i64,
+    /// Segments, clusters and tiles in the patches: new, changed or removed.
+    pub changes: usize,
+    /// Why everything was read anew, if it was.
+    pub resync: Option<ResyncReason>,
+}
+
+/// Why a mirror cannot be kept up to date.
+#[derive(Debug, thiserror::Error)]
+pub enum MirrorError {
+    /// The server did not answer, or refused.
+    #[error(transparent)]
+    Api(#[from] ApiError),
+    /// Another process (or another part of this one) has it open.
+    #[error("{}: this mirror is in use", .folder.display())]
+    InUse {
+        /// Its folder.
+        folder: PathBuf,
+    },
+    /// The folder holds another level's mirror.
+    #[error("{}: this is the mirror of {found}, not of {wanted}", .folder.display())]
+    OtherLevel {
+        /// Its folder.
+        folder: PathBuf,
+        /// Of which level it is.
+        found: LevelAddress,
+        /// Of which it should be.
+        wanted: LevelAddress,
+    },
+    /// A page holds what cannot be in a map.
+    #[error(
+        "the page after revision {since} cannot be taken: {}",
+        .violations.first().map_or_else(String::new, |v| format!("{} at {:?}", v.detail, v.pointer))
+    )]
+    BadPatch {
+        /// The revision before it.
+        since: i64,
+        /// What is wrong with it.
+        violations: Vec<Violation>,
+    },
+    /// The pages do not lead from revision to revision.
+    #[error("asked for what follows revision {asked}, the server answers {since} to {revision}")]
+    BadPage {
+        /// What was asked for.
+        asked: i64,
+        /// Where the page begins.
+        since: i64,
+        /// Where it ends.
+        revision: i64,
+    },
+    /// The map cannot be encoded.
+    #[error(transparent)]
+    Encode(#[from] EncodeError),
+    /// The disk failed.
+    #[error(transparent)]
+    Disk(#[from] DiskError),
+}
+
+impl MirrorError {
+    /// Whether it may go away by waiting.
+    pub fn is_retryable(&self) -> bool {
+        matches!(self, Self::Api(error) if error.is_retryable())
+    }
+
+    fn retry_after(&self) -> Option<Duration> {
+        match self {
+            Self::Api(error) => error.retry_after(),
+            _ => None,
+        }
+    }
+}
+
+/// A local copy of one level.
+#[derive(Debug)]
+pub struct Mirror {
+    folder: PathBuf,
+    level: LevelAddress,
+    config: MirrorConfig,
+    /// Absent before the first refresh.
+    ground: Option<Ground>,
+    copy: Copy,
+    /// Why the next refresh is to begin from nothing.
+    resync: Option<ResyncReason>,
+    /// Whether the disk holds less than this.
+    is_ahead_of_disk: bool,
+    _lock: File,
+}
+
+/// What a level's map stands on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Ground {
+    frame: Uuid,
+    resolution_m: f64,
+}
+
+/// A map at a revision.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Copy {
+    revision: i64,
+    map: LevelMap,
+}
+
+impl Mirror {
+    /// Opens the mirror of `level` in `folder`, which is made if it is missing; empty at revision
+    /// 0 if there is none there yet, or one that is damaged. Blocks on the disk.
+    ///
+    /// # Errors
+    /// The folder holds another level's mirror, or another process has it open; the disk fails.
+    pub fn open(
+        folder: &Path,
+        level: &LevelAddress,
+        config: MirrorConfig,
+    ) -> Result<Self, MirrorError> {
+        let Some(lock) = durable::lock_folder(folder)? else {
+            return Err(MirrorError::InUse { folder: folder.to_owned() });
+        };
+        let mut mirror = Self {
+            folder: folder.to_owned(),
+            level: level.clone(),
+            config,
+            ground: None,
+            copy: Copy::default(),
+            resync: None,
+            is_ahead_of_disk: false,
+            _lock: lock,
+        };
+        match file::read(folder) {
+            Ok(None) => {}
+            Ok(Some(saved)) if saved.level != *level => {
+                return Err(MirrorError::OtherLevel {
+                    folder: folder.to_owned(),
+                    found: saved.level,
+                    wanted: level.clone(),
+                });
+            }
+            Ok(Some(saved)) => {
+                mirror.ground = Some(saved.ground);
+                mirror.copy = saved.copy;
+            }
+            Err(Unusable::Disk(error)) => return Err(error.into()),
+            Err(Unusable::Damaged(what)) => {
+                file::set_aside(folder)?;
+                tracing::warn!(folder = %folder.display(), what, "the mirror on disk is damaged");
+                mirror.resync = Some(ResyncReason::DamagedFile);
+            }
+        }
+        Ok(mirror)
+    }
+
+    /// The revision that it has reached.
+    pub fn revision(&self) -> i64 {
+        self.copy.revision
+    }
+
+    /// UUID of the level's frame; absent before the first refresh.
+    pub fn frame(&self) -> Option<Uuid> {
+        self.ground.map(|ground| ground.frame)
+    }
+
+    /// Edge of a cell of its grid; absent before the first refresh.
+    pub fn resolution_m(&self) -> Option<f64> {
+        self.ground.map(|ground| ground.resolution_m)
+    }
+
+    /// The map.
+    pub fn map(&self) -> &LevelMap {
+        &self.copy.map
+    }
+
+    /// Brings it up to date, and onto disk if anything changed.
+    ///
+    /// # Errors
+    /// See [`MirrorError`]; the mirror is then as it was or at a revision in between.
+    pub async fn refresh(&mut self, api: &Api) -> Result<Refreshed, MirrorError> {
+        let refreshed = self.advance(api).await?;
+        self.save().await?;
+        Ok(refreshed)
+    }
+
+    /// Refreshes every `interval`, through outages too, until `stop` says true (or its sender is
+    /// gone). `tell` hears of every try.
+    ///
+    /// # Errors
+    /// Those that do not go away by waiting.
+    pub async fn follow(
+        &mut self,
+        api: &Api,
+        interval: Duration,
+        mut stop: watch::Receiver<bool>,
+        rng: &mut (impl Rng + Send),
+        mut tell: impl FnMut(&Self, Result<Refreshed, &MirrorError>) + Send,
+    ) -> Result<(), MirrorError> {
+        let mut backoff = Backoff::new(self.config.backoff);
+        let mut saved_at = Instant::now();
+        loop {
+            // Between its waits the refresh leaves the mirror whole: it may be dropped.
+            let outcome = tokio::select! {
+                outcome = self.advance(api) => outcome,
+                _ = stop.wait_for(|stop| *stop) => break,
+            };
+            let wait = match outcome {
+                Ok(refreshed) => {
+                    backoff.succeeded();
+                    tell(self, Ok(refreshed));
+                    interval
+                }
+                Err(error) if error.is_retryable() => {
+                    tell(self, Err(&error));
+                    backoff.failed(error.retry_after(), rng)
+                }
+                Err(error) => {
+                    self.save().await?;
+                    return Err(error);
+                }
+            };
+            if saved_at.elapsed() >= self.config.save_interval {
+                self.save().await?;
+                saved_at = Instant::now();
+            }
+            tokio::select! {
+                () = sleep(wait) => {}
+                _ = stop.wait_for(|stop| *stop) => break,
+            }
+        }
+        self.save().await
+    }
+
+    /// Writes it as GeoJSON, byte for byte like the server's export of that name.
+    ///
+    /// # Errors
+    /// What `to` cannot take.
+    pub fn write_geojson(&self, to: &mut impl Write) -> io::Result<()> {
+        geojson::write_map(&self.copy.map, to)
+    }
+
+    /// Brings it up to date in memory.
+    async fn advance(&mut self, api: &Api) -> Result<Refreshed, MirrorError> {
+        let from_revision = self.copy.revision;
+        let level = api.level(&self.level).await?;
+        let (mut resync, mut changes) = (self.reason_to_resync(&level), 0);
+        if resync.is_none() {
+            self.ground = Some(ground_of(&level));
+            match self.take_pages(api, &mut changes).await {
+                Err(MirrorError::Api(error)) if error.is_refusal("cursor_expired") => {
+                    resync = Some(ResyncReason::ServerWentBack);
+                }
+                other => other?,
+            }
+        }
+        if let Some(reason) = resync {
+            self.begin_again(api, &level, reason, &mut changes).await?;
+        }
+        Ok(Refreshed { from_revision, to_revision: self.copy.revision, changes, resync })
+    }
+
+    fn reason_to_resync(&self, level: &v1::LevelDescription) -> Option<ResyncReason> {
+        if self.ground.is_some_and(|ground| ground != ground_of(level)) {
+            Some(ResyncReason::OtherFrame)
+        } else if level.revision < self.copy.revision {
+            Some(ResyncReason::ServerWentBack)
+        } else {
+            self.resync
+        }
+    }
+
+    /// Reads everything from revision 0. The old copy stays until the new one is whole.
+    async fn begin_again(
+        &mut self,
+        api: &Api,
+        level: &v1::LevelDescription,
+        reason: ResyncReason,
+        changes: &mut usize,
+    ) -> Result<(), MirrorError> {
+        tracing::warn!(
+            level = %self.level,
+            ?reason,
+            mirror_revision = self.copy.revision,
+            server_revision = level.revision,
+            "the mirror begins again from nothing"
+        );
+        // Kept until it is done: a try that breaks off is repeated for the same reason.
+        self.resync = Some(reason);
+        let mut copy = Copy::default();
+        while take_page(api, &self.level, self.config.page_limit, &mut copy, changes).await? {}
+        self.copy = copy;
+        self.ground = Some(ground_of(level));
+        self.resync = None;
+        self.is_ahead_of_disk = true;
+        Ok(())
+    }
+
+    async fn take_pages(&mut self, api: &Api, changes: &mut usize) -> Result<(), MirrorError> {
+        loop {
+            let before = self.copy.revision;
+            let (level, limit) = (&self.level, self.config.page_limit);
+            let more = take_page(api, level, limit, &mut self.copy, changes).await?;
+            self.is_ahead_of_disk |= self.copy.revision != before;
+            if !more {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Writes it to disk, if that holds less.
+    async fn save(&mut self) -> Result<(), MirrorError> {
+        let Some(ground) = self.ground.filter(|_| self.is_ahead_of_disk) else { return Ok(()) };
+        // The copy shares all that it holds with the original.
+        let saved = Saved { level: self.level.clone(), ground, copy: self.copy.clone() };
+        let folder = self.folder.clone();
+        match spawn_blocking(move || file::write(&folder, &saved)).await {
+            Ok(written) => written?,
+            Err(error) => match error.try_into_panic() {
+                Ok(panic) => std::panic::resume_unwind(panic),
+                Err(cancelled) => unreachable!("a task that nobody cancels: {cancelled}"),
+            },
+        }
+        self.is_ahead_of_disk = false;
+        Ok(())
+    }
+}
+
+fn ground_of(level: &v1::LevelDescription) -> Ground {
+    Ground { frame: level.frame, resolution_m: level.resolution_m }
+}
+
+/// Applies the page that follows `copy`, all of it or nothing; answers whether there is more.
+async fn take_page(
+    api: &Api,
+    level: &LevelAddress,
+    limit: u32,
+    copy: &mut Copy,
+    changes: &mut usize,
+) -> Result<bool, MirrorError> {
+    let asked = copy.revision;
+    let page = api.patches(level, asked, limit).await?;
+    let (since, revision, more) = (page.since, page.revision, page.more);
+    if since != asked || revision < asked || (more && revision == asked) {
+        return Err(MirrorError::BadPage { asked, since, revision });
+    }
+    let patch =
+        map_patch(&page).map_err(|violations| MirrorError::BadPatch { since, violations })?;
+    apply(&patch, &mut copy.map);
+    copy.revision = revision;
+    *changes += patch.segments.len()
+        + patch.clusters.len()
+        + patch.tiles.len()
+        + patch.removed_segments.len()
+        + patch.removed_clusters.len()
+        + patch.removed_tiles.len();
+    Ok(more)
+}
+
+#[cfg(test)]
+mod tests;
