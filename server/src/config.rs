@@ -58,6 +58,9 @@ pub struct HttpLimits {
     pub answer_timeout_ms: u64,
     /// Silence after which a live stream says that it is still there.
     pub heartbeat_ms: u64,
+    /// Time from the moment that `/readyz` says no until no more connections are taken: for a
+    /// balancer to notice.
+    pub drain_delay_ms: u64,
     /// Wait for requests in flight when the server stops.
     pub drain_timeout_ms: u64,
 }
@@ -89,6 +92,7 @@ impl Default for HttpLimits {
             body_timeout_ms: 30_000,
             answer_timeout_ms: 60_000,
             heartbeat_ms: 15_000,
+            drain_delay_ms: 0,
             drain_timeout_ms: 10_000,
         }
     }
@@ -113,6 +117,11 @@ impl HttpLimits {
     /// See [`Self::heartbeat_ms`].
     pub fn heartbeat(&self) -> Duration {
         Duration::from_millis(self.heartbeat_ms)
+    }
+
+    /// See [`Self::drain_delay_ms`].
+    pub fn drain_delay(&self) -> Duration {
+        Duration::from_millis(self.drain_delay_ms)
     }
 
     /// See [`Self::drain_timeout_ms`].
@@ -199,17 +208,9 @@ impl Config {
         }
     }
 
-    /// The URL of the database.
-    pub fn database_url(&self) -> String {
-        match &self.database {
-            Some(url) => url.expose().to_owned(),
-            None => format!("sqlite://{}", self.data_dir.join("mapfold.db").display()),
-        }
-    }
-
-    /// Whether the database is the file in [`Self::data_dir`], which then has to be there.
-    pub fn is_embedded(&self) -> bool {
-        self.database.is_none()
+    /// The file of the embedded database; `None` if another database is named.
+    pub fn embedded_file(&self) -> Option<PathBuf> {
+        self.database.is_none().then(|| self.data_dir.join("mapfold.db"))
     }
 }
 
@@ -234,7 +235,7 @@ mod tests {
         assert_eq!(config.data_dir, Path::new("b"));
         assert_eq!(config.http.streams_max, 3);
         assert_eq!(config.http.body_bytes, HttpLimits::default().body_bytes);
-        assert_eq!(config.database_url(), "sqlite://b/mapfold.db");
+        assert_eq!(config.embedded_file(), Some(PathBuf::from("b/mapfold.db")));
     }
 
     #[test]

@@ -5,12 +5,13 @@
 //! * `layers`: what every request passes before and after its handler, in an order that matters.
 //! * `listen`: the accept loop.
 //! * `problem`: every error and the problem that it becomes.
-//! * `access`, `body`, `query`, `answer`: what handlers take in and give out.
+//! * `access`, `body`, `cap`, `query`, `answer`: what handlers take in and give out.
 //! * One file per resource, with thin handlers.
 
 mod access;
 mod answer;
 mod body;
+mod cap;
 mod check;
 mod layers;
 mod listen;

@@ -25,4 +25,4 @@ pub mod store;
 
 mod running;
 
-pub use running::{Running, StartError, open_store, start};
+pub use running::{Running, StartError, open_store, start, start_with};

@@ -16,7 +16,7 @@ use crate::clock::{SharedClock, SystemClock};
 use crate::config::{Config, ConfigError};
 use crate::http::{self, App, Parts};
 use crate::level::{LevelOptions, Levels};
-use crate::store::{Store, StoreError};
+use crate::store::{Store, StoreError, sqlite_url};
 
 /// How often figures are put into their buckets.
 const UPKEEP: Duration = Duration::from_secs(5);
@@ -50,6 +50,7 @@ pub enum StartError {
 pub struct Running {
     address: SocketAddr,
     admin_token: Option<Token>,
+    app: App,
     closing: watch::Sender<bool>,
     serving: JoinHandle<()>,
     upkeep: JoinHandle<()>,
@@ -63,10 +64,14 @@ pub struct Running {
 /// # Errors
 /// What cannot be made, opened or trusted.
 pub async fn open_store(config: &Config) -> Result<Store, StartError> {
-    if config.is_embedded() {
-        make_private_folder(&config.data_dir)?;
-    }
-    let store = Store::connect(&config.database_url()).await?;
+    let url = match (&config.database, config.embedded_file()) {
+        (Some(url), _) => url.expose().to_owned(),
+        (None, file) => {
+            make_private_folder(&config.data_dir)?;
+            sqlite_url(&file.unwrap_or_default())
+        }
+    };
+    let store = Store::connect(&url).await?;
     store.migrate().await?;
     Ok(store)
 }
@@ -76,6 +81,15 @@ pub async fn open_store(config: &Config) -> Result<Store, StartError> {
 /// # Errors
 /// Why it cannot start.
 pub async fn start(config: Config) -> Result<Running, StartError> {
+    start_with(config, LevelOptions::default()).await
+}
+
+/// Starts a server that keeps its levels in memory in another way, which no installation should
+/// need: for tests.
+///
+/// # Errors
+/// Why it cannot start.
+pub async fn start_with(config: Config, options: LevelOptions) -> Result<Running, StartError> {
     config.check_listen()?;
     let clock: SharedClock = Arc::new(SystemClock::start());
     let chance = Chance::from_system()?;
@@ -90,7 +104,7 @@ pub async fn start(config: Config) -> Result<Running, StartError> {
     let address = listener.local_addr().map_err(system(&listening))?;
     let admin_token = auth::admit_first_admin(&store, &chance, chosen, clock.now_us()).await?;
 
-    let levels = Levels::new(store.clone(), Arc::clone(&clock), LevelOptions::default());
+    let levels = Levels::new(store.clone(), Arc::clone(&clock), options);
     let (closing, is_closing) = watch::channel(false);
     let app = App::new(Parts {
         store: store.clone(),
@@ -102,15 +116,9 @@ pub async fn start(config: Config) -> Result<Running, StartError> {
     });
     let router = http::router(&app);
     let serving = tokio::spawn(http::serve(listener, router, config.http, is_closing));
-    let upkeep = tokio::spawn(async move {
-        let mut beat = tokio::time::interval(UPKEEP);
-        loop {
-            beat.tick().await;
-            app.upkeep();
-        }
-    });
+    let upkeep = tokio::spawn(upkeep(app.clone()));
     tracing::info!(%address, "listening");
-    Ok(Running { address, admin_token, closing, serving, upkeep, levels, store })
+    Ok(Running { address, admin_token, app, closing, serving, upkeep, levels, store })
 }
 
 impl Running {
@@ -123,6 +131,11 @@ impl Running {
     /// once.
     pub fn admin_token(&self) -> Option<&Token> {
         self.admin_token.as_ref()
+    }
+
+    /// Makes `/metrics` tell of the whole process: for the program that has only this server.
+    pub fn record_process(&self) {
+        self.app.record_process();
     }
 
     /// Resolves if the database's disk fails; the program should then stop with a failure.
@@ -140,6 +153,14 @@ impl Running {
         self.upkeep.abort();
         self.levels.shutdown().await;
         self.store.close().await;
+    }
+}
+
+async fn upkeep(app: App) {
+    let mut beat = tokio::time::interval(UPKEEP);
+    loop {
+        beat.tick().await;
+        app.upkeep();
     }
 }
 

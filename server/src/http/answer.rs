@@ -49,7 +49,7 @@ impl Tag {
         Self(text)
     }
 
-    /// By all that the bytes depend on: for what would be dear to write only to compare it.
+    /// By all that the bytes depend on: for files that would be dear to write only to compare.
     fn of_revision(frame: Uuid, revision: i64, target: &str, media_type: &str) -> Self {
         let digest = Sha256::new()
             .chain_update(env!("CARGO_PKG_VERSION"))
@@ -133,9 +133,25 @@ impl Reader {
         response
     }
 
-    /// Answers with a part of the map at one revision, written (off the threads that serve other
-    /// requests) only if the client does not have it.
-    pub(super) async fn of_revision(
+    /// Answers with what is known of the map at one revision, written off the threads that serve
+    /// other requests.
+    ///
+    /// Known by its bytes, not by the revision: replicas, and a level that was read back, may date
+    /// a change of the same map differently (never too early), and then say more after a `since`.
+    pub(super) async fn data(
+        &self,
+        revision: i64,
+        media_type: &'static str,
+        write: impl FnOnce() -> Result<Vec<u8>, ApiError> + Send + 'static,
+    ) -> Result<Response, ApiError> {
+        let tagged = || write().map(|bytes| (Tag::of_bytes(&bytes), bytes));
+        let (tag, bytes) = blocking(tagged).await?;
+        Ok(at_revision(self.bytes(media_type, &tag, || bytes), revision))
+    }
+
+    /// Answers with a file that the map at one revision determines byte for byte, written only if
+    /// the client does not have it.
+    pub(super) async fn file(
         &self,
         frame: Uuid,
         revision: i64,
@@ -144,9 +160,7 @@ impl Reader {
     ) -> Result<Response, ApiError> {
         let tag = Tag::of_revision(frame, revision, &self.target, media_type);
         let bytes = if self.has(&tag) { Vec::new() } else { blocking(write).await? };
-        let mut response = self.bytes(media_type, &tag, || bytes);
-        response.headers_mut().insert(REVISION_HEADER, HeaderValue::from(revision));
-        Ok(response)
+        Ok(at_revision(self.bytes(media_type, &tag, || bytes), revision))
     }
 
     /// RFC 9110, section 13.1.2.
@@ -157,6 +171,11 @@ impl Reader {
                 .any(|t| t == "*" || t.strip_prefix("W/").unwrap_or(t) == tag.0)
         })
     }
+}
+
+fn at_revision(mut response: Response, revision: i64) -> Response {
+    response.headers_mut().insert(REVISION_HEADER, HeaderValue::from(revision));
+    response
 }
 
 /// Runs what takes a processor for longer than a few microseconds.

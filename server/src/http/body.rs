@@ -4,13 +4,13 @@ use std::error::Error;
 
 use axum::body::Bytes;
 use axum::extract::{FromRequest, Request};
-use axum::http::HeaderMap;
 use axum::http::header::CONTENT_TYPE;
-use http_body_util::LengthLimitError;
+use axum::http::{HeaderMap, StatusCode};
 use mapfold_schema::codec::{self, DecodeError};
 use serde::de::DeserializeOwned;
 use tower_http::timeout::TimeoutError;
 
+use super::cap::TooLong;
 use super::problem::ApiError;
 use super::state::App;
 
@@ -38,9 +38,12 @@ pub(super) fn media_type(headers: &HeaderMap) -> Result<String, ApiError> {
 /// `DefaultBodyLimit` of the route, which stops reading there.
 pub(super) async fn read(request: Request, limit_bytes: usize) -> Result<Bytes, ApiError> {
     Bytes::from_request(request, &()).await.map_err(|rejection| {
+        if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE {
+            return ApiError::BodyTooLarge { limit_bytes };
+        }
         let mut cause: Option<&(dyn Error + 'static)> = Some(&rejection);
         while let Some(error) = cause {
-            if error.is::<LengthLimitError>() {
+            if error.is::<TooLong>() {
                 return ApiError::BodyTooLarge { limit_bytes };
             }
             if error.is::<TimeoutError>() {

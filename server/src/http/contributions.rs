@@ -96,13 +96,13 @@ fn judge(
     target: &Target,
     received_at_us: i64,
 ) -> Result<Judged, ApiError> {
-    let (uploads, is_array) =
-        codec::decode_uploads(&upload.media_type, &upload.bytes).map_err(refused_body)?;
     let limit = target.limits.batch_max;
+    let (uploads, is_array) = decode(upload, limit)?;
     if uploads.len() > limit {
         return Err(ApiError::TooManyItems { limit });
     }
-    let judge_one = |wire: Contribution| {
+    let judge_one = |wire: Result<Contribution, DecodeError>| {
+        let wire = wire.map_err(refused_body)?;
         if !caller.speaks_for(&wire.robot) {
             return Err(ApiError::OtherRobot { own: caller.robot.clone().unwrap_or_default() });
         }
@@ -111,6 +111,25 @@ fn judge(
         Ok(Accepted::new(wire, checked, received_at_us)?)
     };
     Ok(Judged { items: uploads.into_iter().map(judge_one).collect(), is_array })
+}
+
+type Uploads = Vec<Result<Contribution, DecodeError>>;
+
+/// Reads the body. An array in which something has the wrong shape is read again, element by
+/// element: one that cannot be read does not stop the others.
+fn decode(upload: &Upload, limit: usize) -> Result<(Uploads, bool), ApiError> {
+    let Upload { media_type, bytes } = upload;
+    let error = match codec::decode_uploads(media_type, bytes) {
+        Ok((uploads, is_array)) => return Ok((uploads.into_iter().map(Ok).collect(), is_array)),
+        Err(error) => error,
+    };
+    match (&error, codec::split_array(media_type, bytes, limit)) {
+        (DecodeError::Shape(_), Ok(elements)) => {
+            let read = |element| codec::decode(media_type, element);
+            Ok((elements.into_iter().map(read).collect(), true))
+        }
+        _ => Err(refused_body(error)),
+    }
 }
 
 /// A body of the wrong shape is a contribution that cannot be taken, like one of wrong content.

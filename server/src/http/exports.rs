@@ -53,8 +53,7 @@ pub(super) async fn read(
     let _turn = app.exports.acquire().await.ok().ok_or(ApiError::Closing)?;
     let snapshot = level.level.snapshot();
     let (frame, revision) = (level.level.frame(), snapshot.folded_revision());
-    let mut response =
-        reader.of_revision(frame, revision, media_type, move || write(&snapshot)).await?;
+    let mut response = reader.file(frame, revision, media_type, move || write(&snapshot)).await?;
     let name = format!("attachment; filename=\"{site}-{name}.{extension}\"");
     if let Ok(name) = HeaderValue::from_str(&name) {
         response.headers_mut().insert(CONTENT_DISPOSITION, name);

@@ -29,9 +29,9 @@ use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::compression::predicate::{NotForContentType, Predicate};
 use tower_http::compression::{CompressionLayer, DefaultPredicate};
 use tower_http::decompression::RequestDecompressionLayer;
-use tower_http::limit::RequestBodyLimitLayer;
 use tower_http::timeout::{RequestBodyDeadlineLayer, TimeoutLayer};
 
+use super::cap::cap;
 use super::exports;
 use super::observe::{RequestId, observe};
 use super::problem::{self, ApiError, Outgoing};
@@ -61,7 +61,7 @@ pub(super) fn around(routes: Router, app: &App) -> Router {
     routes
         .layer(DefaultBodyLimit::max(limits.body_bytes))
         .layer(RequestDecompressionLayer::new())
-        .layer(RequestBodyLimitLayer::new(limits.upload_compressed_bytes))
+        .layer(middleware::from_fn_with_state(limits.upload_compressed_bytes, cap))
         .layer(RequestBodyDeadlineLayer::new(limits.body_timeout()))
         .layer(TimeoutLayer::with_status_code(StatusCode::GATEWAY_TIMEOUT, limits.answer_timeout()))
         .layer(middleware::from_fn_with_state(admission, admit))

@@ -39,10 +39,12 @@ pub async fn serve(
         .header_read_timeout(limits.head_timeout())
         .max_header_size(HEAD_BYTES_MAX)
         .max_headers(HEADERS_MAX);
+    let closed = closed(&mut closing, limits.drain_delay());
+    tokio::pin!(closed);
     loop {
         let accepted = tokio::select! {
             accepted = accept(&listener, &connections) => accepted,
-            _ = closing.wait_for(|closing| *closing) => break,
+            () = &mut closed => break,
         };
         let Some((stream, permit)) = accepted else { continue };
         let service = TowerToHyperService::new(router.clone());
@@ -58,6 +60,13 @@ pub async fn serve(
     if tokio::time::timeout(limits.drain_timeout(), graceful.shutdown()).await.is_err() {
         tracing::warn!("some requests did not finish in time and were cut off");
     }
+}
+
+/// Resolves some time after `closing` became true.
+async fn closed(closing: &mut watch::Receiver<bool>, delay: Duration) {
+    // A sender that is gone has closed too.
+    let _: Result<_, watch::error::RecvError> = closing.wait_for(|closing| *closing).await;
+    tokio::time::sleep(delay).await;
 }
 
 /// The next connection, once there is room for one.

@@ -1,6 +1,7 @@
 //! What the server tells of its own work: an id per request, a line per request in the log, and
 //! figures for Prometheus.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::extract::{MatchedPath, Request, State};
@@ -18,9 +19,11 @@ const REQUESTS: &str = "mapfold_http_requests_total";
 const DURATION: &str = "mapfold_http_request_duration_seconds";
 const STREAMS: &str = "mapfold_http_streams";
 const BUILD: &str = "mapfold_build_info";
-/// Upper bounds of the histogram of durations, seconds.
-const BUCKETS: [f64; 12] =
+/// Upper bounds of the histograms of durations, seconds.
+const SECONDS: [f64; 12] =
     [0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 5.0, 30.0];
+/// Upper bounds of the histograms of batches.
+const ITEMS: [f64; 8] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0];
 
 /// Header that names the request.
 const REQUEST_ID_HEADER: &str = "x-request-id";
@@ -29,9 +32,10 @@ const REQUEST_ID_HEADER: &str = "x-request-id";
 #[derive(Debug, Clone)]
 pub(super) struct RequestId(pub(super) String);
 
-/// Figures of one server. Not the process's: several servers may run in one, as in tests.
+/// Figures of one server: of its HTTP side, and (if the program says so, since a process has only
+/// one place for them) of all else.
 pub(super) struct Metrics {
-    recorder: PrometheusRecorder,
+    recorder: Arc<PrometheusRecorder>,
     handle: PrometheusHandle,
 }
 
@@ -49,14 +53,22 @@ impl Default for Metrics {
             PrometheusBuilder::new()
         });
         let recorder = builder.build_recorder();
-        Self { handle: recorder.handle(), recorder }
+        Self { handle: recorder.handle(), recorder: Arc::new(recorder) }
     }
 }
 
 impl Metrics {
     fn builder() -> Result<PrometheusBuilder, BuildError> {
         PrometheusBuilder::new()
-            .set_buckets_for_metric(Matcher::Full(DURATION.to_owned()), &BUCKETS)
+            .set_buckets_for_metric(Matcher::Suffix("_seconds".to_owned()), &SECONDS)?
+            .set_buckets_for_metric(Matcher::Suffix("_batch".to_owned()), &ITEMS)
+    }
+
+    /// Takes in the figures of the whole process from now on.
+    pub(super) fn take_process(&self) {
+        if metrics::set_global_recorder(Arc::clone(&self.recorder)).is_err() {
+            tracing::warn!("somebody else records this process's figures already");
+        }
     }
 
     fn request(&self, method: &'static str, route: &str, status: StatusCode, took: Duration) {

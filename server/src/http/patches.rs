@@ -53,5 +53,5 @@ pub(super) async fn read(
     let revision = snapshot.folded_revision();
     let write =
         move || Ok(codec::encode(media_type, &snapshot.patches_since(query.since, limit)?)?);
-    reader.of_revision(level.level.frame(), revision, media_type, write).await
+    reader.data(revision, media_type, write).await
 }

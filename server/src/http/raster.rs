@@ -38,7 +38,7 @@ pub(super) async fn changes(
         let changes = snapshot.raster_since(query.since, query.bbox.as_ref())?;
         Ok(codec::encode(media_type, &changes)?)
     };
-    reader.of_revision(level.level.frame(), revision, media_type, write).await
+    reader.data(revision, media_type, write).await
 }
 
 /// Which layer of a tile is asked for.

@@ -70,6 +70,11 @@ impl App {
         &self.0.parts.store
     }
 
+    /// Makes `/metrics` tell of the whole process, not only of this server's HTTP side.
+    pub fn record_process(&self) {
+        self.0.metrics.take_process();
+    }
+
     /// What has to be done now and then.
     pub fn upkeep(&self) {
         self.0.metrics.upkeep();

@@ -25,7 +25,7 @@ impl Tiles for Snapshot {
         first: TileKey,
         last: TileKey,
     ) -> Box<dyn Iterator<Item = (&TileKey, &Arc<Tile>)> + '_> {
-        Box::new(self.tiles().filter(move |(key, _)| first <= **key && **key <= last))
+        Box::new(self.tiles_between(first, last))
     }
 }
 

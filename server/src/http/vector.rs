@@ -46,5 +46,5 @@ pub(super) async fn read(
         geojson::write_patch(&patch, &mut bytes).map_err(failed)?;
         Ok(bytes)
     };
-    reader.of_revision(level.level.frame(), revision, media_type, write).await
+    reader.data(revision, media_type, write).await
 }

@@ -110,9 +110,10 @@ impl Snapshot {
     /// A revision that this map has not reached.
     pub fn patches_since(&self, since: i64, limit: usize) -> Result<v1::Patch, SinceError> {
         self.check(since)?;
-        let cut = self.history().cut(since, limit);
-        let until = cut.unwrap_or(self.folded_revision());
-        Ok(wire_patch(&self.patch(since, until), since, until, cut.is_some()))
+        let folded = self.folded_revision();
+        // A cut at the newest revision leaves nothing to ask for.
+        let until = self.history().cut(since, limit).unwrap_or(folded);
+        Ok(wire_patch(&self.patch(since, until), since, until, until < folded))
     }
 
     fn check(&self, since: i64) -> Result<(), SinceError> {
