@@ -1,6 +1,6 @@
 //! What a robot spends on one look: extraction and evidence, on scans of a made-up corridor with
 //! doors, a pillar and noise, with as many beams as scanners of the logs and of today have.
-#![expect(clippy::unwrap_used, missing_docs, reason = "a benchmark stops at the first surprise")]
+#![expect(clippy::unwrap_used, reason = "a benchmark stops at the first surprise")]
 
 use std::hint::black_box;
 
@@ -15,14 +15,14 @@ mod room;
 use room::{Chance, Room};
 
 fn corridor() -> Room {
-    let mut walls = vec![[(-4.0, -1.2), (30.0, -1.2)], [(30.0, -1.2), (30.0, 1.3)]];
+    let mut room = Room::polygon(&[(-4.0, -1.2), (30.0, -1.2), (30.0, 4.0), (-4.0, 4.0)]);
     for door in 0..8 {
         let x = -4.0 + 4.2 * f64::from(door);
-        walls.push([(x, 1.3), (x + 3.2, 1.3)]);
-        walls.push([(x + 3.2, 1.3), (x + 3.2, 4.0)]);
+        room.walls.push([(x, 1.3), (x + 3.2, 1.3)]);
+        room.walls.push([(x + 3.2, 1.3), (x + 3.2, 4.0)]);
     }
-    walls.push([(-4.0, 4.0), (30.0, 4.0)]);
-    Room { walls, pillars: vec![(3.0, -0.8, 0.15), (7.0, 0.9, 0.1)] }
+    room.pillars = vec![(3.0, -0.8, 0.15), (7.0, 0.9, 0.1)];
+    room
 }
 
 fn scans(beams: usize, increment_deg: f64) -> Vec<Scan> {

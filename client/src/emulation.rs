@@ -7,7 +7,7 @@
 
 use mapfold_map::geometry::{Point, Pose, Robot, Sensor, difference};
 
-use crate::sensor::{Ring, Scan, Sonar, SonarProfile};
+use crate::sensor::{MountedAt, Ring, Scan, Sonar, SonarProfile};
 
 /// How surfaces answer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -87,7 +87,7 @@ pub fn emulate(
     let sonars = profile
         .transducers
         .iter()
-        .map(|mount| mount.robot_from_sensor())
+        .map(MountedAt::robot_from_sensor)
         .filter(|robot_from_sonar| in_view(scan, robot_from_sonar, profile.cone_rad))
         .map(|robot_from_sonar| Sonar {
             robot_from_sensor: robot_from_sonar,

@@ -7,13 +7,19 @@
 //! * [`sensor`]: profiles of sensors and the readings they give: the ground.
 //! * [`log`]: readers of recorded robot logs.
 //! * [`perception`]: from a scan to segments and clusters.
-//! * [`evidence`]: from a scan or a ring of sonars to evidence for the grid (written by the lead: use it).
-//! * [`emulation`]: a ring of sonars out of a scanner (written by the lead: use it).
-//! * `sync` is being written by another person in client/src/sync/: use it.
+//! * [`evidence`]: from a scan or a ring of sonars to evidence for the grid.
+//! * [`emulation`]: a ring of sonars out of a scanner, for demonstrations.
+//! * [`geojson`]: features of scans, for looking at.
+//! * [`robot`]: the surveyor, which makes contributions of readings.
+//! * [`sync`]: the outbox, the upload, the mirror of the shared map.
+//! * [`replay`]: a log played against a server as the robot would have lived it.
 
 pub mod emulation;
 pub mod evidence;
+pub mod geojson;
 pub mod log;
 pub mod perception;
+pub mod replay;
+pub mod robot;
 pub mod sensor;
 pub mod sync;

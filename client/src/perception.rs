@@ -108,13 +108,11 @@ pub fn extract_plausible(scan: &Scan, states: &[BeamState], config: &Config) -> 
         .collect();
     let mut features = Features::default();
     for (line, ended) in lines.iter().zip(segments) {
-        let Some(segment) = ended.and_then(|e| segment::in_robot_frame(line, &e, scan)) else {
-            continue;
-        };
+        let Some(ended) = ended else { continue };
         for &point in &line.members {
             beams[points[point].beam] = BeamUse::Segment(features.segments.len() as u32);
         }
-        features.segments.push(segment);
+        features.segments.push(segment::in_robot_frame(line, &ended, scan));
     }
     for cluster in clusters {
         for &point in &cluster.members {

@@ -1,12 +1,5 @@
 //! Extraction against worlds of which the truth is known.
-#![expect(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::float_cmp,
-    clippy::cast_precision_loss,
-    missing_docs,
-    reason = "tests stop at the first surprise, and compare exact figures"
-)]
+#![expect(clippy::unwrap_used, reason = "tests stop at the first surprise")]
 
 #[path = "worlds/room.rs"]
 mod room;

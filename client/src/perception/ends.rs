@@ -35,6 +35,8 @@ pub struct EndsConfig {
     pub jump_depth_min: f64,
     /// So many beams without a point hide what is there.
     pub missing_beams: usize,
+    /// Shortest segment that its corners may leave, metres: half the shortest line.
+    pub length_min: f64,
 }
 
 impl Default for EndsConfig {
@@ -46,6 +48,7 @@ impl Default for EndsConfig {
             jump_spacing_max: 0.5,
             jump_depth_min: 0.15,
             missing_beams: 3,
+            length_min: 0.1,
         }
     }
 }
@@ -68,7 +71,7 @@ enum Side {
     Upper,
 }
 
-/// The ends of every line; `None` for a line that its corners leave no length.
+/// The ends of every line; `None` for a line that its corners leave too short.
 pub fn segments(
     points: &[ScanPoint],
     runs: &[Range<usize>],
@@ -95,7 +98,7 @@ pub fn segments(
             let view = View { points, run, ring, scan, config };
             let (from, lower) = view.end(line, before, Side::Lower);
             let (to, upper) = view.end(line, after, Side::Upper);
-            (to - from > 0.0).then_some(Ended { from, to, ends: [lower, upper] })
+            (to - from >= config.length_min).then_some(Ended { from, to, ends: [lower, upper] })
         })
         .collect()
 }

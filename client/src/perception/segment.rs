@@ -9,12 +9,8 @@ use super::ends::Ended;
 use super::split::FoundLine;
 use crate::sensor::Scan;
 
-/// A line with its ends as the robot hands it in; `None` if rounding left it no length.
-pub(super) fn in_robot_frame(
-    line: &FoundLine,
-    ended: &Ended,
-    scan: &Scan,
-) -> Option<ObservedSegment> {
+/// A line with its ends as the robot hands it in.
+pub(super) fn in_robot_frame(line: &FoundLine, ended: &Ended, scan: &Scan) -> ObservedSegment {
     let robot_from_sensor: &Pose<Robot, Sensor> = &scan.robot_from_sensor;
     let moved = robot_from_sensor.act_on_line(&line.fit.line.line);
     let covariance = line.fit.line.covariance.transformed(&moved.j_line_line);
@@ -30,14 +26,7 @@ pub(super) fn in_robot_frame(
     let across = uncertain.line.across(&robot_from_sensor.position());
     let facing =
         if across < 0.0 || (across == 0.0 && !turned) { Facing::Origin } else { Facing::Away };
-    (to > from && from.is_finite() && to.is_finite()).then_some(ObservedSegment {
-        line: uncertain,
-        from,
-        to,
-        facing,
-        ends,
-        points: line.members.len() as u32,
-    })
+    ObservedSegment { line: uncertain, from, to, facing, ends, points: line.members.len() as u32 }
 }
 
 /// A cluster as the robot hands it in.

@@ -6,11 +6,11 @@ use std::f64::consts::TAU;
 use mapfold_client::sensor::{Scan, ScanGeometry};
 use mapfold_map::geometry::{Point, Pose};
 
-/// A seeded generator (SplitMix64) with Gaussian numbers.
-pub struct Chance(pub u64);
+/// A seeded generator (`SplitMix64`) with Gaussian numbers.
+pub(crate) struct Chance(pub(crate) u64);
 
 impl Chance {
-    pub fn unit(&mut self) -> f64 {
+    pub(crate) fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -18,28 +18,28 @@ impl Chance {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    pub fn gauss(&mut self) -> f64 {
+    pub(crate) fn gauss(&mut self) -> f64 {
         (-2.0 * (1.0 - self.unit()).ln()).sqrt() * (TAU * self.unit()).cos()
     }
 }
 
 /// What stands around.
 #[derive(Debug, Clone, Default)]
-pub struct Room {
-    pub walls: Vec<[(f64, f64); 2]>,
-    pub pillars: Vec<(f64, f64, f64)>,
+pub(crate) struct Room {
+    pub(crate) walls: Vec<[(f64, f64); 2]>,
+    pub(crate) pillars: Vec<(f64, f64, f64)>,
 }
 
 impl Room {
     /// A closed polygon.
-    pub fn polygon(corners: &[(f64, f64)]) -> Self {
+    pub(crate) fn polygon(corners: &[(f64, f64)]) -> Self {
         let walls =
             (0..corners.len()).map(|i| [corners[i], corners[(i + 1) % corners.len()]]).collect();
         Self { walls, pillars: Vec::new() }
     }
 
     /// Distance to the first thing in this direction; infinite if there is none.
-    pub fn cast(&self, from: Point, bearing: f64) -> f64 {
+    pub(crate) fn cast(&self, from: Point, bearing: f64) -> f64 {
         let (dy, dx) = bearing.sin_cos();
         let mut nearest = f64::INFINITY;
         for [a, b] in &self.walls {
@@ -66,7 +66,7 @@ impl Room {
     }
 
     /// A scan from a place, with the range and bearing noise of one beam.
-    pub fn scan(
+    pub(crate) fn scan(
         &self,
         (x, y, heading): (f64, f64, f64),
         (count, increment): (usize, f64),

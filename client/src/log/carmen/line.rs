@@ -6,8 +6,8 @@ use std::str::SplitAsciiWhitespace;
 const READINGS_MAX: usize = 100_000;
 /// Positions farther out than this are a broken line, metres.
 const COORDINATE_MAX: f64 = 1e6;
-/// Instants from here on (year 10000) are a broken line, seconds.
-const TIME_MAX: f64 = 253_402_300_800.0;
+/// Instants from here on (year 2200) are a broken line, seconds; the server says so too.
+const TIME_MAX: f64 = 7_258_118_399.0;
 
 /// Messages that are known and mean nothing to a map.
 const IGNORED: [&str; 24] = [

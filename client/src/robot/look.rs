@@ -1,0 +1,90 @@
+//! What one reading comes to: features and evidence.
+
+use mapfold_map::level::Contribution;
+use mapfold_schema::border::wire_contribution;
+use mapfold_schema::v1;
+use uuid::Uuid;
+
+use super::{Scanner, Surveyor};
+use crate::emulation::{self, Chance};
+use crate::evidence::{scanner_evidence, sonar_evidence};
+use crate::log::{Observation, Reading};
+use crate::perception::{BeamState, extract_plausible, plausibility};
+use crate::sensor::{MountedAt, Ring, Scan};
+
+/// One contribution before it is sent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Look {
+    /// What the fold takes.
+    pub contribution: Contribution,
+    /// Whether its readings were derived from those of another sensor.
+    pub emulated: bool,
+}
+
+impl Look {
+    /// As it travels, for the level with this `frame`.
+    pub fn to_wire(&self, frame: Uuid) -> v1::Contribution {
+        wire_contribution(&self.contribution, frame, self.emulated)
+    }
+}
+
+/// Fills in what the reading shows.
+pub(super) fn fill(surveyor: &mut Surveyor, reading: &Reading, look: &mut Contribution) {
+    match (&reading.observation, surveyor.emulation) {
+        (Observation::Ring(ring), _) => hear(surveyor, ring, look),
+        (Observation::Scan(scan), None) => see(surveyor, scan, look),
+        (Observation::Scan(scan), Some(config)) => {
+            let Some(profile) = &surveyor.sonar else { return };
+            // The id's own chance: the same reading is always heard the same.
+            let mut seed = [0; 8];
+            seed.copy_from_slice(&look.id.0[8..]);
+            let mut chance = Chance::new(u64::from_be_bytes(seed));
+            let ring = emulation::emulate(scan, profile, &config, &mut chance);
+            hear(surveyor, &ring, look);
+        }
+    }
+}
+
+/// Walls, clusters and evidence of a scan.
+fn see(surveyor: &mut Surveyor, scan: &Scan, look: &mut Contribution) {
+    let Some(Scanner { profile, perception, evidence }) = &surveyor.scanner else { return };
+    let mounted = mounted(scan, &profile.mount);
+    let scan = mounted.as_ref().unwrap_or(scan);
+    let states = plausibility::judge(scan, &perception.plausibility);
+    let features = extract_plausible(scan, &states, perception);
+    let usable: Vec<bool> = states.iter().map(|s| *s == BeamState::Hit).collect();
+    let patch = scanner_evidence(
+        scan,
+        &usable,
+        profile,
+        &look.level_from_robot,
+        surveyor.config.resolution,
+        evidence,
+        &mut surveyor.canvas,
+    );
+    look.segments = features.segments;
+    look.clusters = features.clusters;
+    look.evidence.extend((!patch.tiles.is_empty()).then_some(patch));
+}
+
+/// The scan with the profile's mount, if the log told none.
+fn mounted(scan: &Scan, mount: &MountedAt) -> Option<Scan> {
+    let told = &scan.robot_from_sensor;
+    let untold = told.x == 0.0 && told.y == 0.0 && told.heading() == 0.0;
+    (untold && *mount != MountedAt::default())
+        .then(|| Scan { robot_from_sensor: mount.robot_from_sensor(), ..scan.clone() })
+}
+
+/// Evidence of a ring.
+fn hear(surveyor: &mut Surveyor, ring: &Ring, look: &mut Contribution) {
+    let Some(profile) = &surveyor.sonar else { return };
+    let patch = sonar_evidence(
+        ring,
+        profile,
+        &look.level_from_robot,
+        surveyor.config.resolution,
+        &surveyor.sonar_evidence,
+        &mut surveyor.canvas,
+    );
+    look.evidence.extend((!patch.tiles.is_empty()).then_some(patch));
+}
