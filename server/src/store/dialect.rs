@@ -1,4 +1,9 @@
 //! The few words in which SQLite and PostgreSQL differ. All other SQL is one text for both.
+//!
+//! Of sqlx's `Any` driver, which carries that text, three things must be known: SQL has `$1`
+//! parameters; columns are `bigint`, `double precision`, `text` and `blob`/`bytea` only; and a null
+//! `f64` is never bound (sqlx 0.9.0 sends it as a 32-bit one, and PostgreSQL then refuses the next
+//! value of that statement).
 
 /// The engines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

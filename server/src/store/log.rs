@@ -60,8 +60,7 @@ macro_rules! entry_columns {
 macro_rules! page_conditions {
     () => {
         " from contributions where site = $1 and level = $2 and revision < $3 and revision > $4 \
-         and ($6 is null or state = $6) and ($7 is null or (x_m >= $7 and y_m >= $8 \
-         and x_m <= $9 and y_m <= $10))"
+         and ($6 is null or state = $6) and x_m >= $7 and y_m >= $8 and x_m <= $9 and y_m <= $10"
     };
 }
 
@@ -95,7 +94,13 @@ impl Store {
                 " and $5 is null order by revision desc limit $11"
             )
         };
-        let corner = |read: fn(&v1::Bounds) -> f64| filter.bbox.as_ref().map(read);
+        let everywhere = v1::Bounds {
+            min_x_m: f64::NEG_INFINITY,
+            min_y_m: f64::NEG_INFINITY,
+            max_x_m: f64::INFINITY,
+            max_y_m: f64::INFINITY,
+        };
+        let bbox = filter.bbox.unwrap_or(everywhere);
         let rows = sqlx::query(text)
             .bind(site)
             .bind(level)
@@ -103,10 +108,10 @@ impl Store {
             .bind(filter.since.unwrap_or(0))
             .bind(filter.robot.as_deref())
             .bind(filter.state.map(state_text))
-            .bind(corner(|b| b.min_x_m))
-            .bind(corner(|b| b.min_y_m))
-            .bind(corner(|b| b.max_x_m))
-            .bind(corner(|b| b.max_y_m))
+            .bind(bbox.min_x_m)
+            .bind(bbox.min_y_m)
+            .bind(bbox.max_x_m)
+            .bind(bbox.max_y_m)
             .bind(i64::from(limit) + 1)
             .fetch_all(self.reads())
             .await?;

@@ -35,10 +35,10 @@ pub(crate) fn clock() -> Arc<dyn Clock> {
 /// Options under which nothing happens by itself.
 pub(crate) fn still() -> LevelOptions {
     LevelOptions {
-        write_behind_interval: Duration::from_secs(3600),
+        write_behind_interval: Duration::from_hours(1),
         write_behind_revisions: i64::MAX,
-        poll_interval: Duration::from_secs(3600),
-        idle_close: Duration::from_secs(3600),
+        poll_interval: Duration::from_hours(1),
+        idle_close: Duration::from_hours(1),
         ..LevelOptions::default()
     }
 }
@@ -62,7 +62,7 @@ pub(crate) async fn submit_all(level: &LevelHandle, looks: &[v1::Contribution]) 
 }
 
 pub(crate) async fn reached(level: &LevelHandle, revision: i64) -> Arc<Snapshot> {
-    let snapshot = level.snapshot_at(revision, Duration::from_secs(60)).await;
+    let snapshot = level.snapshot_at(revision, Duration::from_mins(1)).await;
     assert_eq!(snapshot.folded_revision(), revision);
     snapshot
 }

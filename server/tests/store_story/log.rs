@@ -157,8 +157,10 @@ async fn what_a_held_robot_sends_is_kept_but_not_folded(database: Database) {
     assert_eq!(append(&store, &batch[1..2]).await, [Appended::Known(held)]);
     let states: Vec<ContributionState> =
         store.log_after(SITE, LEVEL, 0, 9).await.unwrap().iter().map(|row| row.state).collect();
-    use ContributionState::{Folded, Held};
-    assert_eq!(states, [Folded, Held, Folded]);
+    assert_eq!(
+        states,
+        [ContributionState::Folded, ContributionState::Held, ContributionState::Folded]
+    );
 }
 
 async fn the_last_pose_is_the_newest_look(database: Database) {

@@ -144,7 +144,7 @@ async fn replicas_fold_each_others_contributions_to_the_same_bits(database: Data
     }
     let mut published = Vec::new();
     for (_, level) in &replicas {
-        let snapshot = level.snapshot_at(120, Duration::from_secs(60)).await;
+        let snapshot = level.snapshot_at(120, Duration::from_mins(1)).await;
         assert_eq!(snapshot.folded_revision(), 120);
         published.push(snapshot);
     }

@@ -141,5 +141,5 @@ async fn a_stored_map_that_is_not_its_logs_is_folded_again_and_put_right(databas
     let more = submit_all(&level, &looks(23, 80)).await;
     assert_eq!(&*more.map(), folded(&looks(23, 80)).map());
     drop(level);
-    tokio::time::timeout(Duration::from_secs(60), levels.shutdown()).await.unwrap();
+    tokio::time::timeout(Duration::from_mins(1), levels.shutdown()).await.unwrap();
 }

@@ -81,7 +81,7 @@ fn look(numbers: &mut Numbers, i: usize) -> v1::Contribution {
     let sonar = i % 3 == 2;
     let observed_at_us = START_US + i as i64 * 250_000;
     let mut random = [0; 10];
-    random.iter_mut().for_each(|byte| *byte = numbers.next() as u8);
+    random.fill_with(|| numbers.next() as u8);
     let millis = observed_at_us.unsigned_abs() / 1000;
     let id = uuid::Builder::from_unix_timestamp_millis(millis, &random).into_uuid();
     let at = [numbers.between(-11.0, 11.0), numbers.between(-7.0, 7.0)];
@@ -101,7 +101,7 @@ fn look(numbers: &mut Numbers, i: usize) -> v1::Contribution {
             provenance: [v1::Provenance::Datum, v1::Provenance::SharedMap][i % 2],
         },
         segments: if sonar { Vec::new() } else { segments(numbers, at, heading) },
-        clusters: if i % 4 == 0 { vec![cluster(numbers)] } else { Vec::new() },
+        clusters: if i.is_multiple_of(4) { vec![cluster(numbers)] } else { Vec::new() },
         evidence: vec![evidence(numbers, at, sonar)],
     }
 }
@@ -123,7 +123,7 @@ fn segments(numbers: &mut Numbers, at: [f64; 2], heading: f64) -> Vec<v1::Observ
         if rho < 0.0 {
             (rho, alpha) = (-rho, alpha + PI);
         }
-        if rho > 9.0 || rho < 0.2 {
+        if !(0.2..=9.0).contains(&rho) {
             continue;
         }
         let coordinate = |d: [f64; 2]| alpha.cos() * d[1] - alpha.sin() * d[0];
