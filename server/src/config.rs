@@ -216,8 +216,6 @@ impl Config {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
-
     use super::*;
 
     fn loaded(toml: &str, on_top: &serde_json::Value) -> Result<Config, ConfigError> {

@@ -101,8 +101,6 @@ impl Token {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
-
     use rand::SeedableRng;
     use rand::rngs::StdRng;
 

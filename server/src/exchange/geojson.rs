@@ -166,8 +166,6 @@ fn coordinates([x, y]: [f64; 2]) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
-
     use super::*;
 
     fn segment() -> v1::Segment {
@@ -176,6 +174,7 @@ mod tests {
             rho_m: 2.0,
             alpha_rad: 0.0,
             covariance: [[1e-4, 0.0], [0.0, 1e-6]],
+            covariance_independent: [[1e-4, 0.0], [0.0, 1e-6]],
             covariance_dependent: [[0.0; 2]; 2],
             facing: v1::Facing::Origin,
             solid: [(-1.0, 0.5), (1.5, 3.0)]

@@ -193,8 +193,6 @@ async fn path_part(parts: &mut Parts, app: &App, name: &str) -> Result<String, A
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
-
     use axum::http::HeaderName;
 
     use super::*;

@@ -242,8 +242,6 @@ fn liking(accept: &str, media_type: &str) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
-
     use super::*;
 
     fn reader(accept: Option<&str>, none_match: Option<&str>) -> Reader {

@@ -209,3 +209,105 @@ fn named(name: &str, event: &LevelEvent) -> Event {
     let data = serde_json::to_string(event).unwrap_or_default();
     Event::default().id(event.revision.to_string()).event(name).data(data)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use mapfold_schema::v1::Scope;
+    use tokio::sync::Semaphore;
+    use uuid::Uuid;
+
+    use super::*;
+    use crate::chance::Chance;
+    use crate::clock::ManualClock;
+    use crate::config::HttpLimits;
+    use crate::http::Parts;
+    use crate::level::{LevelOptions, Levels};
+    use crate::store::levels::NewLevelRow;
+    use crate::store::{Store, sqlite_url};
+
+    fn event(revision: i64) -> LevelEvent {
+        LevelEvent { revision, robots: Vec::new(), features: 1, tiles: 1 }
+    }
+
+    /// The name and the id of an event, as they go over the line.
+    async fn told(feed: Feed) -> (String, Feed) {
+        let (event, feed) = feed.next().await.unwrap();
+        let sse = Sse::new(stream::iter([event])).into_response();
+        let bytes = axum::body::to_bytes(sse.into_body(), 1 << 16).await.unwrap();
+        let text = String::from_utf8(bytes.to_vec()).unwrap();
+        let field = |name: &str| {
+            text.lines().find_map(|line| Some(line.strip_prefix(name)?.trim().to_owned()))
+        };
+        let name = field("event:").unwrap_or_else(|| "comment".to_owned());
+        (format!("{name} {}", field("id:").unwrap_or_default()).trim().to_owned(), feed)
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_client_that_lags_behind_is_told_to_read_again_and_then_goes_on() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::connect(&sqlite_url(&folder.path().join("x.db"))).await.unwrap();
+        store.migrate().await.unwrap();
+        store.create_site("plant", "plant", 0).await.unwrap();
+        let row = NewLevelRow {
+            level: "floor",
+            name: "floor",
+            frame: Uuid::from_u128(1),
+            resolution_m: 0.05,
+            elevation_m: 0.0,
+            created_at_us: 0,
+        };
+        store.create_level("plant", &row).await.unwrap();
+        let clock: Arc<ManualClock> = Arc::new(ManualClock::at(0));
+        let levels = Levels::new(store.clone(), clock.clone(), LevelOptions::default());
+        let level = levels.open("plant", "floor").await.unwrap().unwrap();
+        let (closing, is_closing) = watch::channel(false);
+        let (sender, events) = broadcast::channel(2);
+        let feed = Feed {
+            app: App::new(Parts {
+                store,
+                levels,
+                clock,
+                chance: Chance::from_system().unwrap(),
+                limits: HttpLimits::default(),
+                closing: is_closing.clone(),
+            }),
+            level,
+            caller: Principal {
+                token_id: "nobody".to_owned(),
+                site: None,
+                robot: None,
+                scopes: vec![Scope::MapRead],
+                expires_at_us: None,
+            },
+            events,
+            closing: is_closing,
+            heartbeat: tokio::time::interval_at(
+                tokio::time::Instant::now() + Duration::from_mins(1),
+                Duration::from_mins(1),
+            ),
+            sent: None,
+            is_new: true,
+            _permit: Arc::new(Semaphore::new(1)).acquire_owned().await.unwrap(),
+        };
+
+        let (first, feed) = told(feed).await;
+        assert_eq!(first, "revision 0");
+        sender.send(event(1)).unwrap();
+        let (second, feed) = told(feed).await;
+        assert_eq!(second, "revision 1");
+        // Five events into a channel that keeps two: three are lost.
+        for revision in 2..=6 {
+            sender.send(event(revision)).unwrap();
+        }
+        let (third, feed) = told(feed).await;
+        assert_eq!(third, "resync 0", "the level here is still empty");
+        let (fourth, feed) = told(feed).await;
+        assert_eq!(fourth, "revision 5");
+        let (fifth, feed) = told(feed).await;
+        assert_eq!(fifth, "revision 6");
+        closing.send(true).unwrap();
+        assert!(feed.next().await.is_none());
+    }
+}

@@ -126,7 +126,7 @@ fn template_of(path: &str) -> String {
         Some(["robots", robot, ..]) if robot.starts_with('{') => parts[6] = "{robot}",
         Some([_, _, "contributions", _]) => parts[8] = "{id}",
         Some([_, _, "tiles", ..]) => {
-            parts.splice(8.., ["{z}", "{row}", "{col}.png"]).for_each(drop)
+            parts.splice(8.., ["{z}", "{row}", "{col}.png"]).for_each(drop);
         }
         Some([_, _, "raster", _, _]) => parts.splice(8.., ["{x}", "{y}"]).for_each(drop),
         Some([_, _, "exports", _]) => parts[8] = "{format}",

@@ -87,7 +87,7 @@ async fn the_page_about_it_loads_nothing_from_elsewhere() {
     assert!(!html.contains("http://") && !html.contains("https://"), "{html}");
     let files: Vec<&str> = html
         .split(['"', '\''])
-        .filter(|text| text.ends_with(".js") || text.ends_with(".css"))
+        .filter(|text| text.rsplit_once('.').is_some_and(|(_, e)| e == "js" || e == "css"))
         .collect();
     assert!(files.len() >= 3, "{files:?}");
     for file in files {

@@ -48,7 +48,7 @@ impl Stream {
         loop {
             if let Some((event, rest)) = self.text.split_once("\n\n") {
                 let event = parsed(event);
-                self.text = rest.to_owned();
+                self.text = String::from(rest);
                 return Some(event);
             }
             let chunk = tokio::time::timeout(PATIENCE, self.response.chunk()).await;

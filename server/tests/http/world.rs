@@ -20,7 +20,7 @@ const PATIENCE: Duration = Duration::from_secs(20);
 pub(crate) struct Level {
     pub(crate) client: Client,
     pub(crate) site: String,
-    pub(crate) level: String,
+    pub(crate) name: String,
 }
 
 /// A scanner.
@@ -53,7 +53,7 @@ impl Level {
         let new =
             NewLevel { level: level.to_owned(), name: None, resolution_m: None, elevation_m: None };
         client.post(&route::of_site(route::LEVELS, site), &new).await.expect(201);
-        let made = Self { client: client.clone(), site: site.to_owned(), level: level.to_owned() };
+        let made = Self { client: client.clone(), site: site.to_owned(), name: level.to_owned() };
         made.enrol("r1").await;
         made
     }
@@ -73,7 +73,7 @@ impl Level {
 
     /// The path of something of the level.
     pub(crate) fn path(&self, template: &str) -> String {
-        route::of_level(template, &self.site, &self.level)
+        route::of_level(template, &self.site, &self.name)
     }
 
     pub(crate) async fn describe(&self) -> LevelDescription {
