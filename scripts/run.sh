@@ -46,7 +46,7 @@ done
 cat <<EOF
 
   Mapfold is at     $server/
-  Open it signed in $server/#token=$token
+  Open it signed in $server/#token=$token&site=mit&level=infinite-corridor
   Admin token       $token   (also in $token_file)
 
   Three robots map the corridors of MIT, 40 times as fast as they did: two with a laser scanner,
@@ -59,7 +59,7 @@ EOF
 replay() {
     local name=$1
     shift
-    "$programs/mapfold-robot" replay "$@" --server "$server" --token "$token" --site mit --create \
+    "$programs/mapfold-robot" replay "$@" --outbox "$data_dir/robots/$name" --server "$server" --token "$token" --site mit --create \
         --robot "$name" --poses log >"$data_dir/$name.log" 2>&1 </dev/null &
     jobs_started+=("$!")
     robots+=("$name:$!")

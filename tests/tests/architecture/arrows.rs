@@ -75,7 +75,6 @@ const MODULES: &[(&str, &[ModuleRule])] = &[
             ("border", &["instant", "slug", "v1"]),
             ("codec", &["border::Violation", "v1"]),
             ("digest", &["codec", "v1"]),
-            ("openapi", &["border", "problem", "route", "v1"]),
             ("malformed", &["border", "v1"]),
         ],
     ),
