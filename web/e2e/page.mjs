@@ -18,6 +18,7 @@
 import { launchBrowser } from "./browser.mjs";
 
 const POLL_MS = 50;
+const PICTURES_MS = 5_000;
 
 /** @param {string} name @param {string} [otherwise] */
 function setting(name, otherwise) {
@@ -138,7 +139,13 @@ try {
   }
 
   const screenshot = process.env["SCREENSHOT"];
-  if (screenshot !== undefined && screenshot !== "") await page.screenshot({ path: screenshot });
+  if (screenshot !== undefined && screenshot !== "") {
+    // All pictures, if they come soon; robots on the move may keep some on their way.
+    await page
+      .waitForFunction(() => document.documentElement.dataset["tilesPending"] === "0", undefined, { timeout: PICTURES_MS })
+      .catch(() => undefined);
+    await page.screenshot({ path: screenshot });
+  }
   delaysMs.sort((a, b) => a - b);
   say({
     event: "end",

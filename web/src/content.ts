@@ -1,7 +1,7 @@
 // The map of one level as the page holds it, and how patches change it. A patch never changes the
 // content in place: what did not change stays the same object, so that drawing can tell.
 
-import { boxAround, type Box } from "./geometry";
+import { boxAround, union, type Box } from "./geometry";
 import type { TileMark } from "./pyramid";
 import type { Cluster, RasterChanges, Segment, TileAddress, VectorPatch } from "./wire";
 
@@ -57,8 +57,8 @@ export function withVector(content: Content, patch: VectorPatch): Content {
   return {
     ...content,
     vectorRevision: patch.revision,
-    segments: patched(base.segments, patch.segments, patch.removed.segments),
-    clusters: patched(base.clusters, patch.clusters, patch.removed.clusters),
+    segments: patched(base.segments, patch.segments, patch.removed.segments ?? []),
+    clusters: patched(base.clusters, patch.clusters, patch.removed.clusters ?? []),
   };
 }
 
@@ -97,23 +97,13 @@ export function tileCount(content: Content): number {
   return count;
 }
 
-/** What the map covers: its features, or its tiles while there are no features; null if there is nothing. */
+/** What the map covers, features and tiles; null if there is nothing. */
 export function boundsOf(content: Content, tileM: number): Box | null {
-  const features = boxAround(content.segments.values(), content.clusters.values());
-  if (features !== null) return features;
-  let box: Box | null = null;
+  let box = boxAround(content.segments.values(), content.clusters.values());
   for (const { address, present } of content.tiles.values()) {
     if (!present) continue;
     const [left, bottom] = [address.x * tileM, address.y * tileM];
-    box =
-      box === null
-        ? [left, bottom, left + tileM, bottom + tileM]
-        : [
-            Math.min(box[0], left),
-            Math.min(box[1], bottom),
-            Math.max(box[2], left + tileM),
-            Math.max(box[3], bottom + tileM),
-          ];
+    box = union(box, [left, bottom, left + tileM, bottom + tileM]);
   }
   return box;
 }

@@ -84,12 +84,10 @@ export function followLevel(options: FeedOptions): () => void {
     dispatch({ kind: "level", level });
   };
 
-  /** Finds out when robots that are not in the newest lines of the log were last heard. */
-  const askForQuietRobots = async (): Promise<void> => {
-    const quiet = robotsHere(state()).filter(
-      ({ robot }) => !state().heardAtMs.has(robot) && !askedFor.has(robot),
-    );
-    for (const { robot } of quiet) {
+  /** Finds out when each robot was last heard, once; from then on events tell. */
+  const askWhenHeard = async (): Promise<void> => {
+    for (const { robot } of robotsHere(state())) {
+      if (askedFor.has(robot)) continue;
       askedFor.add(robot);
       const page = await api.contributions(place, { limit: 1, robot }, signal);
       const last = page.contributions.at(0);
@@ -119,6 +117,7 @@ export function followLevel(options: FeedOptions): () => void {
         dispatch({ kind: "robots", robots });
         dispatch({ kind: "vector", patch });
         dispatch({ kind: "raster", changes });
+        await askWhenHeard();
       } catch (error) {
         whole ||= fromStart;
         if (error instanceof Refused && error.status === 410) {
@@ -139,7 +138,6 @@ export function followLevel(options: FeedOptions): () => void {
         await askLevel();
         const page = await api.contributions(place, { limit: LOG_LINES }, signal);
         dispatch({ kind: "contributions", contributions: page.contributions });
-        await askForQuietRobots();
         const folded = state().level?.folded_revision ?? 0;
         if (whole || folded > state().content.vectorRevision) map.request();
       } catch (error) {

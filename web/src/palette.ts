@@ -3,7 +3,8 @@
 // Six robots have colours of their own; they were searched for so that the least distance between
 // any two (in Oklab), as seen with normal vision and under protanopia, deuteranopia and
 // tritanopia, is as great as it can be while each has a contrast of 3 to 1 against the map's
-// ground. Further robots repeat the colours with dashes. test/palette.test.ts measures all that.
+// ground; orange comes last or not at all, as it is what the server's pictures show of sonar.
+// Further robots repeat the colours with dashes. test/palette.test.ts measures all that.
 
 /** How the lines of one robot are drawn. */
 export interface Stroke {
@@ -36,7 +37,7 @@ export interface Theme {
 export const LIGHT: Theme = {
   name: "light",
   unknown: "#e6eaee",
-  robots: ["#0072b2", "#d55e00", "#aa3377", "#555500", "#9966ff", "#4400cc"],
+  robots: ["#0072b2", "#cc3366", "#556600", "#9966ff", "#660077", "#1100bb"],
   several: "#1f2933",
   silent: "#7b8794",
   grid: "rgba(31, 41, 51, 0.10)",
@@ -50,7 +51,7 @@ export const LIGHT: Theme = {
 export const DARK: Theme = {
   name: "dark",
   unknown: "#12161b",
-  robots: ["#56b4e9", "#e69f00", "#ff5599", "#77ee77", "#9966ff", "#009966"],
+  robots: ["#56b4e9", "#ff5599", "#77ee77", "#9966ff", "#009966", "#e69f00"],
   several: "#f1f5f9",
   silent: "#8b98a5",
   grid: "rgba(241, 245, 249, 0.10)",

@@ -1,7 +1,14 @@
 import { describe, expect, it } from "vitest";
-import { createApi, inWords, Refused, Unreachable, type Api } from "../src/api";
+import openapi from "../../schema/openapi.json";
+import { createApi, eventsPath, inWords, picturePath, Refused, Unreachable, type Api } from "../src/api";
 import { NOON_MS } from "./samples";
 
+/** A path of the description, as far as it matters here. */
+interface Described {
+  get?: { operationId?: string; parameters?: readonly { name: string; in: string }[] };
+  post?: object;
+}
+const PATHS: Record<string, Described> = openapi.paths;
 const PLACE = { site: "plant", level: "ground floor" };
 
 /** An API whose server answers so, and what it was asked. */
@@ -38,6 +45,33 @@ describe("requests", () => {
       "GET /api/v1/sites/plant/robots",
       "GET /api/v1/sites/plant/levels/ground%20floor/tiles/6/-1/3.png?layer=sonar",
     ]);
+  });
+});
+
+describe("the server's description", () => {
+  it("has all the paths that the page asks for, with the parameters that it gives", () => {
+    const described = Object.entries(PATHS).map(([template, { get }]) => {
+      const path = new RegExp(`^${template.replace(/[.]/g, "\\$&").replace(/\{\w+\}/g, "[^/]+")}$`);
+      const query = (get?.parameters ?? []).filter((parameter) => parameter.in === "query").map(({ name }) => name);
+      return { path, query };
+    });
+    const asked = [
+      "/api/v1/session",
+      "/api/v1/sites",
+      "/api/v1/sites/a/robots",
+      "/api/v1/sites/a/levels/b",
+      "/api/v1/sites/a/levels/b/vector?since=1",
+      "/api/v1/sites/a/levels/b/raster?since=1",
+      "/api/v1/sites/a/levels/b/contributions?limit=20&robot=c",
+      eventsPath({ site: "a", level: "b" }),
+      picturePath({ site: "a", level: "b" }, { z: 6, row: -1, col: 3 }, "all"),
+    ];
+    for (const question of asked) {
+      const url = new URL(question, "http://server");
+      const route = described.find(({ path }) => path.test(url.pathname));
+      expect(route, question).toBeDefined();
+      for (const name of url.searchParams.keys()) expect(route?.query, question).toContain(name);
+    }
   });
 });
 

@@ -85,12 +85,13 @@ describe("changes of tiles", () => {
 });
 
 describe("bounds", () => {
-  it("are those of the features where there are any", () => {
+  it("hold the features and the tiles", () => {
+    expect(boundsOf(FIRST, 3.2)).toEqual([2, 1, 6, 6]);
     const both = withRaster(FIRST, rasterChanges(0, 4, { tiles: [tile(-10, -10)] }));
-    expect(boundsOf(both, 3.2)).toEqual([2, 1, 6, 6]);
+    expect(boundsOf(both, 3.2)).toEqual([-32, -32, 6, 6]);
   });
 
-  it("are those of the tiles otherwise", () => {
+  it("hold whole tiles", () => {
     const only = withRaster(NO_CONTENT, rasterChanges(0, 4, { tiles: [tile(-1, 0), tile(2, 1)] }));
     const [left, bottom, right, top] = boundsOf(only, 3.2) ?? [];
     expect([left, bottom]).toEqual([-3.2, 0]);

@@ -128,12 +128,12 @@ describe("following a level", () => {
     expect(world.state.content.vectorRevision).toBe(205);
   });
 
-  it("hears robots by events, and asks the log once about those that are quiet", async () => {
+  it("asks the log once when each robot was heard, and then hears them by events", async () => {
     world.follow();
     await vi.advanceTimersByTimeAsync(5_000);
     world.say("open");
     await vi.advanceTimersByTimeAsync(5_000);
-    expect(world.questions("contributions 1 ")).toEqual(["contributions 1 quiet"]);
+    expect(world.questions("contributions 1 ")).toEqual(["contributions 1 ada", "contributions 1 quiet"]);
     expect(world.state.heardAtMs.get("quiet")).toBe(Date.UTC(2026, 10, 21));
     world.revisionEvent();
     expect(world.state.heardAtMs.get("ada")).toBe(NOON_MS);

@@ -4,6 +4,7 @@ import { xScreenFromLevel, yScreenFromLevel, type Frame, type Pen } from "../src
 import { paintRaster } from "../src/map/paint_raster";
 import { paintSegments } from "../src/map/paint_segments";
 import type { Wanted } from "../src/map/pictures";
+import { clearOf, type Label } from "../src/map/robot_labels";
 import { LIGHT } from "../src/palette";
 import { pictureKey, type PictureMark } from "../src/pyramid";
 import { segment } from "./samples";
@@ -78,6 +79,26 @@ describe("batches", () => {
     const many = Array.from({ length: 1000 }, (_, i) => segment(`s${i}`));
     expect(paintSegments(frame(pen), batchesOf(many, slots), LIGHT)).toBe(1000);
     expect(calls.filter((call) => call === "stroke").length).toBeGreaterThanOrEqual(4);
+  });
+});
+
+describe("labels of robots", () => {
+  const label = (xMiddlePx: number, topPx: number): Label => ({ name: "a", what: "b", colour: "#000000", xMiddlePx, topPx, widthPx: 100 });
+
+  it("keep clear of each other", () => {
+    const placed: Label[] = [];
+    for (const wanted of [label(0, 0), label(10, 5), label(60, 30), label(500, 10), label(20, 0)]) {
+      placed.push(clearOf(placed, wanted));
+    }
+    for (const [i, a] of placed.entries()) {
+      for (const b of placed.slice(0, i)) {
+        const apart = Math.abs(a.xMiddlePx - b.xMiddlePx) >= 100 || Math.abs(a.topPx - b.topPx) >= 33;
+        expect(apart, JSON.stringify([a, b])).toBe(true);
+      }
+    }
+    // Nobody is moved without need.
+    expect(placed[0]?.topPx).toBe(0);
+    expect(placed[3]?.topPx).toBe(10);
   });
 });
 

@@ -31,6 +31,10 @@ export function segment(id: string, fields: Partial<Segment> = {}): Segment {
       [0.0004, 0],
       [0, 0.0001],
     ],
+    covariance_independent: [
+      [0.0003, 0],
+      [0, 0.0001],
+    ],
     covariance_dependent: [
       [0.0001, 0],
       [0, 0],

@@ -1,11 +1,11 @@
 // Paints robots: an arrow along the heading, the ellipse that holds the position with 95 %, and the
 // name with what the robot can observe. A full arrow can scan; a hollow one has only sonar.
 
-import { competenceInWords } from "../competence";
 import { poseEllipse95, Z_95 } from "../geometry";
 import { strokeOf, type Theme } from "../palette";
 import type { PlacedRobot } from "../state";
 import { xScreenFromLevel, yScreenFromLevel, type Frame } from "./frame";
+import { clearOf, labelOf, paintLabel, type Label } from "./robot_labels";
 
 /** A robot as it is drawn. */
 export interface RobotMark {
@@ -24,7 +24,13 @@ export function paintRobots(frame: Frame, marks: readonly RobotMark[], theme: Th
   const ordered = [...marks].sort((a, b) => Number(b.silent) - Number(a.silent));
   for (const mark of ordered) paintUncertainty(frame, mark, theme);
   for (const mark of ordered) paintArrow(frame, mark, theme);
-  for (const mark of ordered) paintLabel(frame, mark, theme);
+  // Those heard choose their places first.
+  const labels: Label[] = [];
+  for (const mark of ordered.reverse()) {
+    const wanted = labelOf(frame, mark, { colour: colourOf(mark, theme), belowPx: ARROW_PX + 7 });
+    labels.push(clearOf(labels, wanted));
+  }
+  for (const label of labels) paintLabel(frame, label, theme);
 }
 
 function colourOf(mark: RobotMark, theme: Theme): string {
@@ -85,32 +91,4 @@ function paintArrow(frame: Frame, mark: RobotMark, theme: Theme): void {
   pen.fill();
   pen.stroke();
   pen.restore();
-}
-
-function paintLabel(frame: Frame, mark: RobotMark, theme: Theme): void {
-  const pose = mark.robot.last_pose;
-  const { pen } = frame;
-  const x = xScreenFromLevel(frame, pose.x_m);
-  const y = yScreenFromLevel(frame, pose.y_m) + ARROW_PX + 7;
-  const name = mark.robot.name;
-  const what = mark.silent ? `${competenceInWords(mark.robot)} · offline` : competenceInWords(mark.robot);
-
-  pen.font = "600 12px system-ui, sans-serif";
-  const nameWidth = pen.measureText(name).width;
-  pen.font = "11px system-ui, sans-serif";
-  const whatWidth = pen.measureText(what).width;
-  const width = Math.max(nameWidth, whatWidth) + 12;
-
-  pen.fillStyle = theme.label;
-  pen.beginPath();
-  pen.roundRect(x - width / 2, y, width, 33, 5);
-  pen.fill();
-  pen.textAlign = "center";
-  pen.textBaseline = "top";
-  pen.fillStyle = colourOf(mark, theme);
-  pen.font = "600 12px system-ui, sans-serif";
-  pen.fillText(name, x, y + 4);
-  pen.fillStyle = theme.gridText;
-  pen.font = "11px system-ui, sans-serif";
-  pen.fillText(what, x, y + 18);
 }

@@ -42,6 +42,7 @@ function howMuch(entry: ContributionEntry): string {
 function createRow(entry: ContributionEntry, { store, theme }: { store: Store; theme: () => Theme }): Row<Item> {
   const line = swatch();
   const who = el("span", { class: "name" });
+  const place = el("span", { class: "when" });
   const when = el("span", { class: "when" });
   const what = el("span", { class: "what" });
   const [x, y] = entry.pose;
@@ -60,7 +61,7 @@ function createRow(entry: ContributionEntry, { store, theme }: { store: Store; t
       },
     },
     line.element,
-    who,
+    el("span", { class: "who-and-where" }, who, place),
     when,
     what,
   );
@@ -70,8 +71,9 @@ function createRow(entry: ContributionEntry, { store, theme }: { store: Store; t
       line.draw(strokeOf(theme(), state.slots.get(now.robot) ?? 0));
       const name = state.robots.find((robot) => robot.robot === now.robot)?.name ?? now.robot;
       setText(who, now.state === "folded" ? name : `${name} · ${now.state}`);
+      setText(place, `#${count(now.revision)}`);
       setText(when, ago(Date.parse(now.received_at), state.nowMs));
-      setText(what, `#${count(now.revision)} · ${howMuch(now)}${now.emulated ? " · emulated" : ""}`);
+      setText(what, `${howMuch(now)}${now.emulated ? " · emulated" : ""}`);
       button.classList.toggle("out", now.state !== "folded");
     },
   };

@@ -26,7 +26,7 @@ export function createLevelCard(parent: HTMLElement): (state: State) => void {
       setText(value, level === null ? "–" : count(values[index] ?? 0));
     });
     const behind = level === null ? 0 : level.revision - Math.max(level.folded_revision, content.vectorRevision);
-    const cell = level === null ? "" : `Cells of ${lengthInWords(level.resolution_m)}.`;
-    setText(foot, behind > 0 ? `${cell} ${count(behind)} more on the way into the map.` : cell);
+    const cell = level === null ? "" : `Cells of ${lengthInWords(level.resolution_m)}`;
+    setText(foot, behind > 0 ? `${cell} · ${count(behind)} on the way into the map` : cell);
   };
 }

@@ -93,7 +93,7 @@ function describeRobot(robot: RobotDescription, state: State): Description {
     ["Competence", competenceInWords(robot)],
     ...robot.sensors.map((sensor): [string, string] => [
       "Sensor",
-      `${sensor.model === "" ? sensor.kind : sensor.model}, up to ${lengthInWords(sensor.range_max_m)}${sensor.emulated ? ", emulated" : ""}`,
+      `${sensor.model === undefined || sensor.model === "" ? sensor.kind : sensor.model}, up to ${lengthInWords(sensor.range_max_m)}${sensor.emulated ? ", emulated" : ""}`,
     ]),
     ["Contributions", count(robot.contributions)],
   ];

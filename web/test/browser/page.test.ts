@@ -3,6 +3,7 @@
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, it } from "vitest";
 import { launchBrowser } from "../../e2e/browser.mjs";
+import { LIGHT } from "../../src/palette";
 import { createMockServer, MOCK_TOKEN } from "../mock/server.mjs";
 
 type Mock = ReturnType<typeof createMockServer>;
@@ -130,9 +131,10 @@ describe("the map", () => {
     expect(await fact("tiles")).toBe(String(tiles));
     expect(await fact("robots")).toBe("3");
     expect(Number(await fact("tilesLoaded"))).toBeGreaterThan(0);
-    // Ada's, Bruno's and Sina's colours.
-    for (const colour of ["#0072b2", "#d55e00", "#aa3377"]) expect(await pixels("segments", colour)).toBeGreaterThan(50);
-    expect(await pixels("robots", "#0072b2")).toBeGreaterThan(50);
+    for (const colour of LIGHT.robots.slice(0, 3)) {
+      expect(await pixels("segments", colour)).toBeGreaterThan(50);
+      expect(await pixels("robots", colour)).toBeGreaterThan(50);
+    }
     expect(await pixels("raster", "#ffffff")).toBeGreaterThan(1000);
     expect(await page.textContent(".robots")).toContain("sonar (emulated)");
     expect(await page.textContent(".contributions")).toContain("Sina");
@@ -283,7 +285,7 @@ describe("the operator", () => {
     await caughtUp();
     expect(await page.isVisible("#panels")).toBe(false);
     await page.click(".panels-toggle");
-    expect(await page.isVisible("#panels")).toBe(true);
+    await page.waitForSelector("#panels .robots", { state: "visible" });
     const wide = await page.evaluate(() => document.documentElement.scrollWidth);
     expect(wide).toBeLessThanOrEqual(800);
   });

@@ -140,15 +140,19 @@ export function createMockLevel({ nowMs, seed = 1 }) {
     const quality = (before?.quality ?? 0) + 1;
     const t = (ends.from_m + ends.to_m) / 2;
     const angleVar = (0.6 * Math.PI / 180) ** 2 / quality;
-    const offsetVar = 0.02 ** 2 / quality + 0.012 ** 2;
+    const sharedVar = 0.012 ** 2;
+    const ownVar = 0.02 ** 2 / quality;
+    /** @type {(offsetVar: number, turnVar: number) => import("../../src/wire").Matrix2} */
+    const about = (offsetVar, turnVar) => [[offsetVar + t * t * turnVar, t * turnVar], [t * turnVar, turnVar]];
     segments.set(id, {
       revision,
       segment: {
         id,
         rho_m: rho,
         alpha_rad: alpha,
-        covariance: [[offsetVar + t * t * angleVar, t * angleVar], [t * angleVar, angleVar]],
-        covariance_dependent: [[0.012 ** 2, 0], [0, 0]],
+        covariance: about(ownVar + sharedVar, angleVar),
+        covariance_independent: about(ownVar, angleVar),
+        covariance_dependent: about(sharedVar, 0),
         facing: "origin",
         solid: [{ ...ends, ends: ["corner", quality > 3 ? "jump" : "occluded"] }],
         quality,
