@@ -19,18 +19,18 @@ const ARROW_PX = 13;
 /** An uncertain heading is drawn as a fan this long. */
 const FAN_PX = 30;
 
-/** Paints robots; those heard lie above the silent ones. */
+/** Paints robots; those heard lie above the silent ones, and no label hides an arrow. */
 export function paintRobots(frame: Frame, marks: readonly RobotMark[], theme: Theme): void {
   const ordered = [...marks].sort((a, b) => Number(b.silent) - Number(a.silent));
   for (const mark of ordered) paintUncertainty(frame, mark, theme);
-  for (const mark of ordered) paintArrow(frame, mark, theme);
   // Those heard choose their places first.
   const labels: Label[] = [];
-  for (const mark of ordered.reverse()) {
+  for (const mark of [...ordered].reverse()) {
     const wanted = labelOf(frame, mark, { colour: colourOf(mark, theme), belowPx: ARROW_PX + 7 });
     labels.push(clearOf(labels, wanted));
   }
   for (const label of labels) paintLabel(frame, label, theme);
+  for (const mark of ordered) paintArrow(frame, mark, theme);
 }
 
 function colourOf(mark: RobotMark, theme: Theme): string {
