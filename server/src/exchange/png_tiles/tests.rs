@@ -1,3 +1,5 @@
+//! Pictures of small maps, pixel by pixel.
+
 use mapfold_map::raster::{Cell, TILE_CELLS};
 use uuid::Uuid;
 
