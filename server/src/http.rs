@@ -26,6 +26,8 @@ mod contributions;
 mod docs;
 mod events;
 mod exports;
+#[cfg(test)]
+mod fixture;
 mod health;
 mod levels;
 mod page;

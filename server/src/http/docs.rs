@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use axum::extract::Path;
 use axum::http::HeaderValue;
-use axum::http::header::CACHE_CONTROL;
+use axum::http::header::{CACHE_CONTROL, VARY};
 use axum::response::{IntoResponse, Redirect, Response};
 use mapfold_schema::codec::JSON;
 use utoipa_swagger_ui::Config;
@@ -53,5 +53,7 @@ fn file(reader: &Reader, path: &str) -> Result<Response, ApiError> {
 
 fn public(mut response: Response) -> Response {
     response.headers_mut().insert(CACHE_CONTROL, HeaderValue::from_static("no-cache"));
+    // The same for everybody.
+    response.headers_mut().remove(VARY);
     response
 }

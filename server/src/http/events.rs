@@ -216,16 +216,10 @@ mod tests {
 
     use mapfold_schema::v1::Scope;
     use tokio::sync::Semaphore;
-    use uuid::Uuid;
 
     use super::*;
-    use crate::chance::Chance;
-    use crate::clock::ManualClock;
     use crate::config::HttpLimits;
-    use crate::http::Parts;
-    use crate::level::{LevelOptions, Levels};
-    use crate::store::levels::NewLevelRow;
-    use crate::store::{Store, sqlite_url};
+    use crate::http::fixture::Fixture;
 
     fn event(revision: i64) -> LevelEvent {
         LevelEvent { revision, robots: Vec::new(), features: 1, tiles: 1 }
@@ -246,34 +240,12 @@ mod tests {
 
     #[tokio::test(flavor = "multi_thread")]
     async fn a_client_that_lags_behind_is_told_to_read_again_and_then_goes_on() {
-        let folder = tempfile::tempdir().unwrap();
-        let store = Store::connect(&sqlite_url(&folder.path().join("x.db"))).await.unwrap();
-        store.migrate().await.unwrap();
-        store.create_site("plant", "plant", 0).await.unwrap();
-        let row = NewLevelRow {
-            level: "floor",
-            name: "floor",
-            frame: Uuid::from_u128(1),
-            resolution_m: 0.05,
-            elevation_m: 0.0,
-            created_at_us: 0,
-        };
-        store.create_level("plant", &row).await.unwrap();
-        let clock: Arc<ManualClock> = Arc::new(ManualClock::at(0));
-        let levels = Levels::new(store.clone(), clock.clone(), LevelOptions::default());
-        let level = levels.open("plant", "floor").await.unwrap().unwrap();
-        let (closing, is_closing) = watch::channel(false);
+        let fixture = Fixture::new(HttpLimits::default()).await;
         let (sender, events) = broadcast::channel(2);
         let feed = Feed {
-            app: App::new(Parts {
-                store,
-                levels,
-                clock,
-                chance: Chance::from_system().unwrap(),
-                limits: HttpLimits::default(),
-                closing: is_closing.clone(),
-            }),
-            level,
+            closing: fixture.app.parts.closing.clone(),
+            app: fixture.app,
+            level: fixture.level,
             caller: Principal {
                 token_id: "nobody".to_owned(),
                 site: None,
@@ -282,7 +254,6 @@ mod tests {
                 expires_at_us: None,
             },
             events,
-            closing: is_closing,
             heartbeat: tokio::time::interval_at(
                 tokio::time::Instant::now() + Duration::from_mins(1),
                 Duration::from_mins(1),
@@ -307,7 +278,7 @@ mod tests {
         assert_eq!(fourth, "revision 5");
         let (fifth, feed) = told(feed).await;
         assert_eq!(fifth, "revision 6");
-        closing.send(true).unwrap();
+        fixture.closing.send(true).unwrap();
         assert!(feed.next().await.is_none());
     }
 }

@@ -168,3 +168,47 @@ async fn secure(request: Request, next: Next) -> Response {
     }
     response
 }
+
+#[cfg(test)]
+mod tests {
+    use axum::body::{Body, to_bytes};
+    use axum::routing::get;
+    use tower::ServiceExt as _;
+
+    use super::*;
+    use crate::config::HttpLimits;
+    use crate::http::fixture::Fixture;
+
+    async fn problem(routes: Router, path: &str, limits: HttpLimits) -> Problem {
+        let fixture = Fixture::new(limits).await;
+        let request = Request::builder().uri(path).body(Body::empty()).unwrap();
+        let response = around(routes, &fixture.app).oneshot(request).await.unwrap();
+        let status = response.status();
+        assert_eq!(response.headers()[CONTENT_TYPE], PROBLEM_JSON);
+        assert!(response.headers().contains_key(POLICY_HEADER));
+        let body = to_bytes(response.into_body(), 1 << 16).await.unwrap();
+        let problem: Problem = serde_json::from_slice(&body).unwrap();
+        assert_eq!(problem.status, status);
+        problem
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_panic_becomes_a_problem_that_tells_nothing_of_it() {
+        let panics = || async { std::hint::black_box(None::<Response>).expect("the secret") };
+        let routes = Router::new().route("/panics", get(panics));
+        let problem = problem(routes, "/panics", HttpLimits::default()).await;
+        assert_eq!((problem.status, problem.code.as_str()), (500, "internal"));
+        assert!(!serde_json::to_string(&problem).unwrap().contains("secret"));
+        assert!(problem.request_id.is_some());
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_handler_that_takes_too_long_is_given_up() {
+        let hangs = || async { std::future::pending::<Response>().await };
+        let routes = Router::new().route("/hangs", get(hangs));
+        let limits = HttpLimits { answer_timeout_ms: 50, ..HttpLimits::default() };
+        let problem = problem(routes, "/hangs", limits).await;
+        assert_eq!((problem.status, problem.code.as_str()), (504, "timeout"));
+        assert!(problem.retryable);
+    }
+}

@@ -1,6 +1,6 @@
 //! `/` and the files of the operators' page.
 
-use axum::http::header::CACHE_CONTROL;
+use axum::http::header::{CACHE_CONTROL, VARY};
 use axum::http::{HeaderValue, Method, Uri};
 use axum::response::Response;
 
@@ -29,5 +29,7 @@ fn answer(reader: &Reader, asset: Asset) -> Response {
     let kept = if asset.is_immutable { FOR_EVER } else { REVALIDATE };
     let mut response = reader.bytes(asset.media_type, &tag, || asset.bytes);
     response.headers_mut().insert(CACHE_CONTROL, HeaderValue::from_static(kept));
+    // The same for everybody.
+    response.headers_mut().remove(VARY);
     response
 }

@@ -316,3 +316,56 @@ pub(super) fn of_status(status: StatusCode, limit_bytes: usize) -> Problem {
         _ => ApiError::Internal(String::new()).problem(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use uuid::Uuid;
+
+    use super::*;
+
+    fn told(error: &ApiError) -> (u16, String, bool) {
+        let problem = error.problem();
+        (problem.status, problem.code, problem.retryable)
+    }
+
+    #[test]
+    fn why_a_contribution_was_not_acknowledged_is_told_apart() {
+        let (level, robot) = ("floor".to_owned(), "r1".to_owned());
+        for (error, status, code, retryable) in [
+            (SubmitError::QueueFull { level, capacity: 9 }, 503, "queue_full", true),
+            (
+                SubmitError::Conflict { id: Uuid::nil(), revision: 3 },
+                409,
+                "contribution_conflict",
+                false,
+            ),
+            (SubmitError::UnknownRobot { robot }, 404, "robot_not_found", false),
+            (SubmitError::DiskFull, 507, "storage_full", true),
+            (SubmitError::Unavailable("secret".to_owned()), 503, "unavailable", true),
+        ] {
+            assert_eq!(told(&ApiError::Submit(error)), (status, code.to_owned(), retryable));
+        }
+    }
+
+    #[test]
+    fn faults_of_ours_tell_the_client_nothing_but_the_log_all() {
+        let cause = "password=hunter2".to_owned();
+        for error in [
+            ApiError::Internal(cause.clone()),
+            ApiError::Store(StoreError::Untrusted(cause.clone())),
+            ApiError::Store(StoreError::DiskFailed(cause.clone())),
+            ApiError::Submit(SubmitError::Unavailable(cause.clone())),
+        ] {
+            assert!(!serde_json::to_string(&error.problem()).unwrap().contains("hunter2"));
+            assert!(error.cause().unwrap().contains("hunter2"));
+        }
+    }
+
+    #[test]
+    fn a_revision_ahead_of_the_fold_is_worth_waiting_for_and_one_ahead_of_the_log_is_not() {
+        let since = |since| ApiError::Since(SinceError { since, folded_revision: 5, revision: 7 });
+        assert_eq!(told(&since(6)), (503, "revision_not_reached".to_owned(), true));
+        assert_eq!(told(&since(8)), (410, "cursor_expired".to_owned(), false));
+        assert_eq!(told(&since(-1)), (400, "query_invalid".to_owned(), false));
+    }
+}

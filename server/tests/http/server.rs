@@ -3,7 +3,8 @@
 use std::net::SocketAddr;
 
 use mapfold_server::config::{Config, Secret};
-use mapfold_server::{Running, start};
+use mapfold_server::level::LevelOptions;
+use mapfold_server::{Running, start_with};
 use tempfile::TempDir;
 
 use crate::client::Client;
@@ -25,6 +26,11 @@ impl Server {
 
     /// A server whose settings `change` has changed.
     pub(crate) async fn start_with(change: impl FnOnce(&mut Config)) -> Self {
+        Self::start_as(change, LevelOptions::default()).await
+    }
+
+    /// A server that keeps its levels in another way.
+    pub(crate) async fn start_as(change: impl FnOnce(&mut Config), levels: LevelOptions) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let mut config = Config {
             listen: "127.0.0.1:0".parse().unwrap(),
@@ -33,7 +39,7 @@ impl Server {
             ..Config::default()
         };
         change(&mut config);
-        Self { running: start(config).await.unwrap(), folder }
+        Self { running: start_with(config, levels).await.unwrap(), folder }
     }
 
     pub(crate) fn address(&self) -> SocketAddr {

@@ -7,6 +7,7 @@ use mapfold_schema::codec::{self, CBOR, JSON};
 use mapfold_schema::digest::content_digest;
 use mapfold_schema::v1::{ContributionPage, ContributionRecord, Receipt, UploadAnswer};
 use mapfold_schema::{malformed, route};
+use mapfold_server::level::LevelOptions;
 use serde_json::{Value, json};
 
 use crate::server::Server;
@@ -112,6 +113,23 @@ async fn more_than_64_at_once_are_refused_and_64_are_taken() {
         server.admin().post(&path, &&looks[..64]).await.expect(201).data();
     assert_eq!(answers.len(), 64);
     floor.folded(64).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_finds_no_place_in_the_queue_is_to_be_sent_again() {
+    let levels = LevelOptions { queue_capacity: 2, ..LevelOptions::default() };
+    let server = Server::start_as(|_| {}, levels).await;
+    let floor = Level::create(&server.admin()).await;
+    let path = floor.path(route::CONTRIBUTIONS);
+    let looks = [floor.look("r1", 1).await, floor.look("r1", 2).await, floor.look("r1", 3).await];
+    let answer = server.admin().post(&path, &looks).await;
+    assert_eq!(answer.header("retry-after"), "1");
+    let problem = answer.problem(503);
+    assert_eq!((problem.code.as_str(), problem.retryable), ("queue_full", true));
+    assert_eq!(floor.describe().await.revision, 0);
+    let answers: Vec<UploadAnswer> =
+        server.admin().post(&path, &&looks[..2]).await.expect(201).data();
+    assert!(answers.iter().all(|answer| matches!(answer, UploadAnswer::Receipt(_))));
 }
 
 #[tokio::test(flavor = "multi_thread")]
