@@ -31,6 +31,7 @@ use std::time::Duration;
 use sqlx::{Any, AnyPool, Transaction};
 
 use dialect::Dialect;
+use engine::Pools;
 
 pub use engine::sqlite_url;
 pub use error::StoreError;
@@ -49,8 +50,7 @@ pub struct Store {
 #[derive(Debug)]
 struct Inner {
     dialect: &'static Dialect,
-    readers: AnyPool,
-    writers: AnyPool,
+    pools: Pools,
 }
 
 impl Store {
@@ -62,8 +62,8 @@ impl Store {
     /// # Errors
     /// What cannot be opened, or not be trusted.
     pub async fn connect(url: &str) -> Result<Self, StoreError> {
-        let (dialect, readers, writers) = engine::open(url).await?;
-        Ok(Self { inner: Arc::new(Inner { dialect, readers, writers }) })
+        let (dialect, pools) = engine::open(url).await?;
+        Ok(Self { inner: Arc::new(Inner { dialect, pools }) })
     }
 
     /// Brings the tables up to date.
@@ -71,7 +71,7 @@ impl Store {
     /// # Errors
     /// A migration that fails, or a database that a newer server has migrated.
     pub async fn migrate(&self) -> Result<(), StoreError> {
-        engine::migrate(self.inner.dialect, &self.inner.writers).await
+        engine::migrate(self.inner.dialect, &self.inner.pools.migrators).await
     }
 
     /// Whether the database answers: for `/readyz`.
@@ -79,14 +79,15 @@ impl Store {
     /// # Errors
     /// The reason why it does not.
     pub async fn ping(&self) -> Result<(), StoreError> {
-        sqlx::query("select 1").execute(&self.inner.readers).await?;
+        sqlx::query("select 1").execute(&self.inner.pools.readers).await?;
         Ok(())
     }
 
     /// Waits for running statements and closes all connections.
     pub async fn close(&self) {
-        self.inner.writers.close().await;
-        self.inner.readers.close().await;
+        self.inner.pools.migrators.close().await;
+        self.inner.pools.writers.close().await;
+        self.inner.pools.readers.close().await;
     }
 
     /// The engine's name, for people.
@@ -99,7 +100,7 @@ impl Store {
     /// # Errors
     /// [`StoreError::Unsupported`] on PostgreSQL; a file that exists or cannot be written.
     pub async fn copy_to(&self, file: &Path) -> Result<(), StoreError> {
-        engine::copy_to(self.inner.dialect, &self.inner.readers, file).await
+        engine::copy_to(self.inner.dialect, &self.inner.pools.readers, file).await
     }
 
     /// Whether the engine finds its own file sound; what it found otherwise. PostgreSQL checks its
@@ -108,27 +109,27 @@ impl Store {
     /// # Errors
     /// The store cannot be read at all.
     pub async fn check_file(&self) -> Result<Vec<String>, StoreError> {
-        engine::check_file(self.inner.dialect, &self.inner.readers).await
+        engine::check_file(self.inner.dialect, &self.inner.pools.readers).await
     }
 
     /// Where plain reads go.
     fn reads(&self) -> &AnyPool {
-        &self.inner.readers
+        &self.inner.pools.readers
     }
 
     /// Where single statements that write go.
     fn writes(&self) -> &AnyPool {
-        &self.inner.writers
+        &self.inner.pools.writers
     }
 
     /// A transaction that writes.
     async fn begin_write(&self) -> Result<Transaction<'static, Any>, StoreError> {
-        Ok(self.inner.writers.begin_with(self.inner.dialect.begin_write).await?)
+        Ok(self.inner.pools.writers.begin_with(self.inner.dialect.begin_write).await?)
     }
 
     /// A transaction whose reads all see the same state.
     async fn begin_read(&self) -> Result<Transaction<'static, Any>, StoreError> {
-        Ok(self.inner.readers.begin_with(self.inner.dialect.begin_read).await?)
+        Ok(self.inner.pools.readers.begin_with(self.inner.dialect.begin_read).await?)
     }
 }
 

@@ -73,6 +73,10 @@ impl DiskAlarm {
         tracing::error!(why, "the disk of the database failed");
         self.0.send_replace(Some(why));
     }
+
+    pub(super) fn is_raised(&self) -> bool {
+        self.0.borrow().is_some()
+    }
 }
 
 /// The open levels. Clones share them.
@@ -111,7 +115,10 @@ struct Open {
 
 impl Open {
     fn is_alive(&self) -> bool {
-        !self.shared.queue.is_closed() && !self.task.is_finished()
+        // The appender still takes, the folder still publishes, and neither has panicked.
+        !self.shared.queue.is_closed()
+            && self.shared.snapshots.has_changed().is_ok()
+            && !self.task.is_finished()
     }
 
     /// Commits and folds what waits, writes what is unwritten, and ends.
@@ -264,12 +271,14 @@ impl Inner {
             snapshots: published.clone(),
             alarm: self.alarm.clone(),
         };
+        let stop_all = Arc::clone(&stop);
         let task = tokio::spawn(async move {
             metrics::gauge!("mapfold_levels_open").increment(1.0);
             let folder = async {
                 if let Err(error) = folder.run(folding).await {
-                    // Its ends of the channels are gone now, which ends the other two; whoever
+                    // The others must end too: what is appended now would not be folded. Whoever
                     // asks for the level next has it read back.
+                    stop_all.notify_one();
                     tracing::error!(
                         site = identity.site,
                         level = identity.level,

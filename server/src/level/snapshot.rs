@@ -1,5 +1,6 @@
 //! What a level publishes: its map at one revision, and since when each thing is as it is.
 
+use std::fmt;
 use std::sync::{Arc, OnceLock};
 
 use mapfold_map::geometry::Point;
@@ -11,8 +12,7 @@ use mapfold_schema::v1;
 use super::folding::Folding;
 use super::history::MapHistory;
 
-/// A level's map at one revision; immutable. Copies share what they have in common.
-#[derive(Debug)]
+/// A level's map at one revision; immutable. Shares with other revisions what they have in common.
 pub struct Snapshot {
     resolution_m: f64,
     revision: i64,
@@ -20,6 +20,17 @@ pub struct Snapshot {
     history: MapHistory,
     map: OnceLock<Arc<LevelMap>>,
     bounds: OnceLock<Option<v1::Bounds>>,
+}
+
+impl fmt::Debug for Snapshot {
+    /// Which one it is and how much it holds: nobody wants a whole map in a message.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Snapshot")
+            .field("folded_revision", &self.folded_revision)
+            .field("revision", &self.revision)
+            .field("counts", &self.counts())
+            .finish_non_exhaustive()
+    }
 }
 
 impl Snapshot {

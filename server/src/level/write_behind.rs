@@ -74,7 +74,8 @@ impl Writer {
     /// another replica may have brought beyond.
     async fn write(&self, snapshot: &Arc<Snapshot>, written: i64) -> Result<i64, StoreError> {
         let until = snapshot.folded_revision();
-        if until <= written {
+        // A failed disk is not written to again: what it says then is worth nothing.
+        if until <= written || self.alarm.is_raised() {
             return Ok(written);
         }
         let Identity { site, level } = &*self.identity;

@@ -28,6 +28,8 @@ pub(super) struct Dialect {
     pub(super) begin_read: &'static str,
     /// Run on every new connection.
     pub(super) session: &'static [&'static str],
+    /// Run besides on the connection that migrates, which may take its time.
+    pub(super) migration_session: &'static [&'static str],
     /// Connections that may write at the same time. SQLite has one writer; a queue in front of
     /// it is fair, its busy handler is not.
     pub(super) writers_max: u32,
@@ -45,8 +47,9 @@ pub(super) static SQLITE: Dialect = Dialect {
         "pragma synchronous = full",
         "pragma foreign_keys = on",
         // Another process (a backup, `verify`) may hold the write lock for a moment.
-        "pragma busy_timeout = 10000",
+        "pragma busy_timeout = 3000",
     ],
+    migration_session: &["pragma busy_timeout = 60000"],
     writers_max: 1,
 };
 
@@ -59,9 +62,11 @@ pub(super) static POSTGRES: Dialect = Dialect {
     session: &[
         "set application_name = 'mapfold-server'",
         "set statement_timeout = '30s'",
-        "set lock_timeout = '10s'",
+        "set lock_timeout = '3s'",
         // A replica that hangs must not keep the lock of a level.
         "set idle_in_transaction_session_timeout = '30s'",
     ],
+    // Another replica may be at it: its advisory lock is waited for.
+    migration_session: &["set statement_timeout = 0", "set lock_timeout = 0"],
     writers_max: 16,
 };

@@ -35,27 +35,43 @@ pub fn sqlite_url(file: &Path) -> String {
     url
 }
 
-pub(super) async fn open(url: &str) -> Result<(&'static Dialect, AnyPool, AnyPool), StoreError> {
-    sqlx::any::install_default_drivers();
-    if url.starts_with("sqlite:") {
-        let separator = if url.contains('?') { '&' } else { '?' };
-        let url = format!("{url}{separator}mode=rwc");
-        // The writer first: it makes the file and its write-ahead log.
-        let writers = pool(&SQLITE, &url, SQLITE.writers_max).await?;
-        trust_sqlite(&writers).await?;
-        Ok((&SQLITE, pool(&SQLITE, &url, READERS_MAX).await?, writers))
-    } else if url.starts_with("postgres:") || url.starts_with("postgresql:") {
-        let writers = pool(&POSTGRES, url, POSTGRES.writers_max).await?;
-        trust_postgres(&writers).await?;
-        Ok((&POSTGRES, pool(&POSTGRES, url, READERS_MAX).await?, writers))
-    } else {
-        let scheme = url.split(':').next().unwrap_or_default();
-        Err(StoreError::BadUrl(format!("there is no engine {scheme:?}")))
-    }
+/// Where statements go. The connections of each kind are made as they are needed.
+#[derive(Debug)]
+pub(super) struct Pools {
+    /// Statements and transactions that read.
+    pub(super) readers: AnyPool,
+    /// Statements and transactions that write.
+    pub(super) writers: AnyPool,
+    /// Migrations.
+    pub(super) migrators: AnyPool,
 }
 
-async fn pool(
-    dialect: &'static Dialect,
+pub(super) async fn open(url: &str) -> Result<(&'static Dialect, Pools), StoreError> {
+    sqlx::any::install_default_drivers();
+    let (dialect, url) = if url.starts_with("sqlite:") {
+        let separator = if url.contains('?') { '&' } else { '?' };
+        (&SQLITE, format!("{url}{separator}mode=rwc"))
+    } else if url.starts_with("postgres:") || url.starts_with("postgresql:") {
+        (&POSTGRES, url.to_owned())
+    } else {
+        let scheme = url.split(':').next().unwrap_or_default();
+        return Err(StoreError::BadUrl(format!("there is no engine {scheme:?}")));
+    };
+    let pools = Pools {
+        readers: pool(dialect.session, &[], &url, READERS_MAX)?,
+        writers: pool(dialect.session, &[], &url, dialect.writers_max)?,
+        migrators: pool(dialect.session, dialect.migration_session, &url, 1)?,
+    };
+    match dialect.engine {
+        Engine::Sqlite => trust_sqlite(&pools.writers).await?,
+        Engine::Postgres => trust_postgres(&pools.writers).await?,
+    }
+    Ok((dialect, pools))
+}
+
+fn pool(
+    session: &'static [&'static str],
+    more: &'static [&'static str],
     url: &str,
     connections_max: u32,
 ) -> Result<AnyPool, StoreError> {
@@ -64,14 +80,13 @@ async fn pool(
         .acquire_timeout(ACQUIRE_TIMEOUT)
         .after_connect(move |connection, _| {
             Box::pin(async move {
-                for statement in dialect.session {
+                for statement in session.iter().chain(more) {
                     connection.execute(*statement).await?;
                 }
                 Ok(())
             })
         })
-        .connect(url)
-        .await
+        .connect_lazy(url)
         .map_err(|error| match error {
             sqlx::Error::Configuration(e) => StoreError::BadUrl(e.to_string()),
             other => other.into(),

@@ -34,7 +34,7 @@ const fn digits(mut number: usize) -> usize {
     count
 }
 
-/// Length of the text that [`write`] writes.
+/// Length of the text that [`write()`] writes.
 pub(super) const fn length(
     before: &str,
     after: &str,

@@ -14,6 +14,7 @@
 mod engines;
 mod synthetic;
 
+mod faults;
 mod levels_in_memory;
 mod log;
 mod maintenance;
