@@ -2,15 +2,16 @@
 
 use axum::extract::Path;
 use axum::response::Response;
-use mapfold_map::raster::{TILE_CELLS, TileIndex, TileKey};
+use mapfold_map::raster::{self, TILE_CELLS, TileIndex, TileKey};
 use mapfold_schema::v1::{RasterChanges, SensorClass};
 use mapfold_schema::{codec, route};
 use serde::Deserialize;
 
 use super::access::{LevelFor, Read};
-use super::answer::{DATA, Reader};
+use super::answer::{DATA, Reader, Tag};
 use super::problem::ApiError;
 use super::query::{QueryOf, SinceInBox};
+use crate::level::Snapshot;
 
 const BINARY: &str = "application/octet-stream";
 
@@ -76,22 +77,24 @@ pub(super) async fn tile(
     let missing = || ApiError::not_found("tile", format!("{x}/{y}"));
     let (Ok(x_index), Ok(y_index)) = (x.parse(), y.parse()) else { return Err(missing()) };
     let tile = TileIndex { x: x_index, y: y_index };
-    let snapshot = level.level.snapshot();
-    let asked_for = |class| query.sensor.is_none_or(|asked| asked == SensorClass::from(class));
+    let bytes = sums(&level.level.snapshot(), tile, query.sensor).ok_or_else(missing)?;
+    let tag = Tag::of_bytes(&bytes);
+    Ok(reader.bytes(media_type, &tag, || bytes))
+}
+
+/// The cells of one layer, or of the sum of all, in little-endian; `None` without evidence.
+fn sums(snapshot: &Snapshot, tile: TileIndex, sensor: Option<SensorClass>) -> Option<Vec<u8>> {
     let mut sums = vec![0_i32; TILE_CELLS];
     let mut found = false;
-    for class in mapfold_map::raster::SensorClass::ALL.into_iter().filter(|c| asked_for(*c)) {
-        if let Some((_, layer)) = snapshot.tile(&TileKey { class, tile }) {
+    for class in raster::SensorClass::ALL {
+        let asked_for = sensor.is_none_or(|sensor| sensor == SensorClass::from(class));
+        let layer = snapshot.tile(&TileKey { class, tile }).filter(|_| asked_for);
+        if let Some((_, layer)) = layer {
             found = true;
             for (sum, cell) in sums.iter_mut().zip(layer.cells()) {
                 *sum = sum.wrapping_add(*cell);
             }
         }
     }
-    if !found {
-        return Err(missing());
-    }
-    let bytes: Vec<u8> = sums.iter().flat_map(|sum| sum.to_le_bytes()).collect();
-    let tag = super::answer::Tag::of_bytes(&bytes);
-    Ok(reader.bytes(media_type, &tag, || bytes))
+    found.then(|| sums.iter().flat_map(|sum| sum.to_le_bytes()).collect())
 }
