@@ -266,7 +266,7 @@ async fn a_level_that_nobody_holds_is_written_and_closed(database: Database) {
     let after = bits(&*reached(&level, 21).await, 0);
     assert_ne!(before, after);
     drop(level);
-    assert_eq!(events.recv().await.unwrap().revision, 21);
+    while events.recv().await.unwrap().revision < 21 {}
     let ended = tokio::time::timeout(Duration::from_secs(30), events.recv()).await;
     assert!(ended.unwrap().is_err(), "whoever listens learns that the level was closed");
     let level = levels.open(SITE, LEVEL).await.unwrap().unwrap();
