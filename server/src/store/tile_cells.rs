@@ -36,8 +36,6 @@ pub fn decode(column: &[u8]) -> Result<Tile, PayloadError> {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
-
     use super::*;
 
     #[test]
