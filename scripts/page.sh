@@ -12,4 +12,8 @@ fi
 if [ ! -e node_modules/.package-lock.json ] || [ package-lock.json -nt node_modules/.package-lock.json ]; then
     npm ci --no-audit --no-fund </dev/null
 fi
-npm run --silent build </dev/null
+# A page that is built anew would have the server compiled anew, for the same bytes.
+if [ ! -e dist/index.html ] ||
+    [ -n "$(find . -path ./node_modules -prune -o -path ./dist -prune -o -type f -newer dist/index.html -print -quit)" ]; then
+    npm run --silent build </dev/null
+fi

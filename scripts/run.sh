@@ -10,7 +10,7 @@ server="http://$listen"
 
 scripts/install-rust.sh
 scripts/page.sh
-cargo build --release --bins -p mapfold-server -p mapfold-client
+cargo build --release --workspace --bins
 programs=${CARGO_TARGET_DIR:-target}/release
 
 # The token outlives a restart with the data that it opens.
@@ -49,7 +49,7 @@ cat <<EOF
   Open it signed in $server/#token=$token&site=mit&level=infinite-corridor
   Admin token       $token   (also in $token_file)
 
-  Three robots map the corridors of MIT, 40 times as fast as they did: two with a laser scanner,
+  Three robots map the corridors of MIT, 32 times as fast as they did: two with a laser scanner,
   one with sonar only (emulated from its part of the laser log). On a second level a real ring
   of eight sonars maps one corridor. Ctrl-C stops everything.
 
@@ -65,9 +65,9 @@ replay() {
     robots+=("$name:$!")
 }
 robots=()
-replay anna tests/data/killian.log.gz --level infinite-corridor --to 2558 --speed 40
-replay bruno tests/data/killian.log.gz --level infinite-corridor --from 2558 --to 5116 --speed 40
-replay clara tests/data/killian.log.gz --level infinite-corridor --from 5116 --speed 40 \
+replay anna tests/data/killian.log.gz --level infinite-corridor --to 2558 --speed 32
+replay bruno tests/data/killian.log.gz --level infinite-corridor --from 2558 --to 5116 --speed 32
+replay clara tests/data/killian.log.gz --level infinite-corridor --from 5116 --speed 32 \
     --competence sonar --emulate-sonar
 replay ring tests/data/corridor-ring8.log.gz --level ring8-corridor --speed 2
 
