@@ -83,7 +83,8 @@ impl std::fmt::Debug for Api {
 impl Api {
     /// The API at `base_url` (`http://..` or `https://..`, without `/api/v1`), as the holder of
     /// `token`. Proxies of the environment are not used, and redirections are not followed: a
-    /// token goes to the server that it is for and nowhere else.
+    /// token goes to the server that it is for and nowhere else. For `https` the system's root
+    /// certificates are trusted (or those of `SSL_CERT_FILE`, for a plant with its own).
     ///
     /// # Errors
     /// A URL that is none; no [`tls::install_provider`] before; for `https`, no root certificates.

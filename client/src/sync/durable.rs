@@ -11,6 +11,8 @@ use std::path::{Path, PathBuf};
 /// Suffix of files that are being written; what bears it after a crash is worth nothing.
 pub(super) const UNFINISHED: &str = ".tmp";
 const LOCK: &str = "lock";
+/// Files that are waited for together; more brought nothing.
+const SYNCS_AT_A_TIME: usize = 16;
 
 /// The disk failed.
 #[derive(Debug, thiserror::Error)]
@@ -55,6 +57,28 @@ pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<File, DiskError> {
     Ok(file)
 }
 
+/// Puts the bytes of several files on the disk.
+///
+/// Waits for several at a time, because the disk then serves them together: 64 files of 1 kB took
+/// 130 ms one by one and 15 ms by sixteen (ext4 on a virtual disk, another time 324 and 24 ms).
+pub(super) fn sync_together(files: &[(File, PathBuf)]) -> Result<(), DiskError> {
+    let sync = |files: &[(File, PathBuf)]| {
+        files.iter().try_for_each(|(file, path)| file.sync_data().map_err(at(path)))
+    };
+    let per_thread = files.len().div_ceil(SYNCS_AT_A_TIME).max(1);
+    if files.len() <= per_thread {
+        return sync(files);
+    }
+    std::thread::scope(|scope| {
+        let threads: Vec<_> =
+            files.chunks(per_thread).map(|part| scope.spawn(move || sync(part))).collect();
+        threads.into_iter().try_for_each(|thread| match thread.join() {
+            Ok(synced) => synced,
+            Err(panic) => std::panic::resume_unwind(panic),
+        })
+    })
+}
+
 /// Puts `bytes` in the place of whatever `path` was, whole or not at all.
 pub(super) fn replace(path: &Path, bytes: &[u8]) -> Result<(), DiskError> {
     let unfinished = unfinished(path);
@@ -94,6 +118,17 @@ mod tests {
         assert!(lock_folder(&path).unwrap().is_none());
         drop(lock);
         assert!(lock_folder(&path).unwrap().is_some());
+    }
+
+    #[test]
+    fn any_number_of_files_can_be_synced_together() {
+        let folder = tempfile::tempdir().unwrap();
+        for count in [0, 1, 2, 16, 17, 100] {
+            let paths = (0..count).map(|n| folder.path().join(n.to_string()));
+            let files: Vec<(File, PathBuf)> =
+                paths.map(|path| (write(&path, b"x").unwrap(), path)).collect();
+            sync_together(&files).unwrap();
+        }
     }
 
     #[test]

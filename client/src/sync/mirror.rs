@@ -2,8 +2,9 @@
 //!
 //! Patches are applied with the map's own code and compute nothing, so the copy equals the
 //! server's map bit for bit. A server that was set back to an older backup, or a level that was
-//! made anew, is noticed by its revision or its frame; the mirror then begins again from nothing
-//! and says so.
+//! made anew, is noticed by its revision, its frame or its counts; the mirror then begins again
+//! from nothing and says so. (What is not noticed: a server that was set back and has since reached
+//! the same revision with as many segments, clusters and tiles.)
 
 mod file;
 mod geojson;
@@ -56,6 +57,9 @@ pub enum ResyncReason {
     OtherFrame,
     /// The server's log ends before the mirror's revision: it was set back to an older backup.
     ServerWentBack,
+    /// At the same revision the server counts other numbers of segments, clusters or tiles: it was
+    /// set back and has gone another way since.
+    Diverged,
     /// The file on disk was damaged; it lies beside the new one as `level.mirror.damaged`.
     DamagedFile,
 }
@@ -146,11 +150,13 @@ pub struct Mirror {
     config: MirrorConfig,
     /// Absent before the first refresh.
     ground: Option<Ground>,
-    copy: Copy,
+    known: KnownMap,
     /// Why the next refresh is to begin from nothing.
     resync: Option<ResyncReason>,
     /// Whether the disk holds less than this.
     is_ahead_of_disk: bool,
+    /// Whether the server's counts are worth a look: not if they do not even fit a fresh copy.
+    counts_are_checked: bool,
     _lock: File,
 }
 
@@ -163,9 +169,19 @@ struct Ground {
 
 /// A map at a revision.
 #[derive(Debug, Clone, Default, PartialEq)]
-struct Copy {
+struct KnownMap {
     revision: i64,
     map: LevelMap,
+}
+
+impl KnownMap {
+    /// Whether the level, as it was described, counts other things at the same revision.
+    fn contradicts(&self, level: &v1::LevelDescription) -> bool {
+        let (map, counts) = (&self.map, &level.counts);
+        let here = [map.segments.len(), map.clusters.len(), map.tiles.len()];
+        let there = [counts.segments, counts.clusters, counts.tiles];
+        self.revision == level.folded_revision && here.map(|count| count as i64) != there
+    }
 }
 
 impl Mirror {
@@ -187,9 +203,10 @@ impl Mirror {
             level: level.clone(),
             config,
             ground: None,
-            copy: Copy::default(),
+            known: KnownMap::default(),
             resync: None,
             is_ahead_of_disk: false,
+            counts_are_checked: true,
             _lock: lock,
         };
         match file::read(folder) {
@@ -203,7 +220,7 @@ impl Mirror {
             }
             Ok(Some(saved)) => {
                 mirror.ground = Some(saved.ground);
-                mirror.copy = saved.copy;
+                mirror.known = saved.known;
             }
             Err(Unusable::Disk(error)) => return Err(error.into()),
             Err(Unusable::Damaged(what)) => {
@@ -217,7 +234,7 @@ impl Mirror {
 
     /// The revision that it has reached.
     pub fn revision(&self) -> i64 {
-        self.copy.revision
+        self.known.revision
     }
 
     /// UUID of the level's frame; absent before the first refresh.
@@ -232,7 +249,7 @@ impl Mirror {
 
     /// The map.
     pub fn map(&self) -> &LevelMap {
-        &self.copy.map
+        &self.known.map
     }
 
     /// Brings it up to date, and onto disk if anything changed.
@@ -298,12 +315,12 @@ impl Mirror {
     /// # Errors
     /// What `to` cannot take.
     pub fn write_geojson(&self, to: &mut impl Write) -> io::Result<()> {
-        geojson::write_map(&self.copy.map, to)
+        geojson::write_map(&self.known.map, to)
     }
 
     /// Brings it up to date in memory.
     async fn advance(&mut self, api: &Api) -> Result<Refreshed, MirrorError> {
-        let from_revision = self.copy.revision;
+        let from_revision = self.known.revision;
         let level = api.level(&self.level).await?;
         let (mut resync, mut changes) = (self.reason_to_resync(&level), 0);
         if resync.is_none() {
@@ -314,17 +331,21 @@ impl Mirror {
                 }
                 other => other?,
             }
+            if self.counts_are_checked && self.known.contradicts(&level) {
+                resync = Some(ResyncReason::Diverged);
+            }
         }
         if let Some(reason) = resync {
             self.begin_again(api, &level, reason, &mut changes).await?;
+            self.counts_are_checked = !self.known.contradicts(&level);
         }
-        Ok(Refreshed { from_revision, to_revision: self.copy.revision, changes, resync })
+        Ok(Refreshed { from_revision, to_revision: self.known.revision, changes, resync })
     }
 
     fn reason_to_resync(&self, level: &v1::LevelDescription) -> Option<ResyncReason> {
         if self.ground.is_some_and(|ground| ground != ground_of(level)) {
             Some(ResyncReason::OtherFrame)
-        } else if level.revision < self.copy.revision {
+        } else if level.revision < self.known.revision {
             Some(ResyncReason::ServerWentBack)
         } else {
             self.resync
@@ -342,15 +363,15 @@ impl Mirror {
         tracing::warn!(
             level = %self.level,
             ?reason,
-            mirror_revision = self.copy.revision,
+            mirror_revision = self.known.revision,
             server_revision = level.revision,
             "the mirror begins again from nothing"
         );
         // Kept until it is done: a try that breaks off is repeated for the same reason.
         self.resync = Some(reason);
-        let mut copy = Copy::default();
-        while take_page(api, &self.level, self.config.page_limit, &mut copy, changes).await? {}
-        self.copy = copy;
+        let mut known = KnownMap::default();
+        while take_page(api, &self.level, self.config.page_limit, &mut known, changes).await? {}
+        self.known = known;
         self.ground = Some(ground_of(level));
         self.resync = None;
         self.is_ahead_of_disk = true;
@@ -359,10 +380,10 @@ impl Mirror {
 
     async fn take_pages(&mut self, api: &Api, changes: &mut usize) -> Result<(), MirrorError> {
         loop {
-            let before = self.copy.revision;
+            let before = self.known.revision;
             let (level, limit) = (&self.level, self.config.page_limit);
-            let more = take_page(api, level, limit, &mut self.copy, changes).await?;
-            self.is_ahead_of_disk |= self.copy.revision != before;
+            let more = take_page(api, level, limit, &mut self.known, changes).await?;
+            self.is_ahead_of_disk |= self.known.revision != before;
             if !more {
                 return Ok(());
             }
@@ -373,7 +394,7 @@ impl Mirror {
     async fn save(&mut self) -> Result<(), MirrorError> {
         let Some(ground) = self.ground.filter(|_| self.is_ahead_of_disk) else { return Ok(()) };
         // The copy shares all that it holds with the original.
-        let saved = Saved { level: self.level.clone(), ground, copy: self.copy.clone() };
+        let saved = Saved { level: self.level.clone(), ground, known: self.known.clone() };
         let folder = self.folder.clone();
         match spawn_blocking(move || file::write(&folder, &saved)).await {
             Ok(written) => written?,
@@ -391,15 +412,15 @@ fn ground_of(level: &v1::LevelDescription) -> Ground {
     Ground { frame: level.frame, resolution_m: level.resolution_m }
 }
 
-/// Applies the page that follows `copy`, all of it or nothing; answers whether there is more.
+/// Applies the page that follows `known`, all of it or nothing; answers whether there is more.
 async fn take_page(
     api: &Api,
     level: &LevelAddress,
     limit: u32,
-    copy: &mut Copy,
+    known: &mut KnownMap,
     changes: &mut usize,
 ) -> Result<bool, MirrorError> {
-    let asked = copy.revision;
+    let asked = known.revision;
     let page = api.patches(level, asked, limit).await?;
     let (since, revision, more) = (page.since, page.revision, page.more);
     if since != asked || revision < asked || (more && revision == asked) {
@@ -407,8 +428,8 @@ async fn take_page(
     }
     let patch =
         map_patch(&page).map_err(|violations| MirrorError::BadPatch { since, violations })?;
-    apply(&patch, &mut copy.map);
-    copy.revision = revision;
+    apply(&patch, &mut known.map);
+    known.revision = revision;
     *changes += patch.segments.len()
         + patch.clusters.len()
         + patch.tiles.len()

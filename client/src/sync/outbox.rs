@@ -37,7 +37,7 @@ use folders::Folders;
 use index::{Entry, Index};
 use receipts::{Key, Receipts};
 
-use super::durable::{self, at};
+use super::durable;
 use super::encoded::EncodedContribution;
 
 /// How much an outbox may hold.
@@ -295,7 +295,7 @@ impl Outbox {
         }
     }
 
-    /// Writes new files: all bytes, one wait for the disk each, all names, one wait for the folder.
+    /// Writes new files: all bytes, a wait for the disk, all names, a wait for the folder.
     /// Only what is on the disk for certain enters the index; what could not be finished is taken
     /// away again, and if that fails too it is found when the outbox is opened.
     fn write(&self, files: &[(Entry, Vec<u8>)]) -> Result<(), OutboxError> {
@@ -335,15 +335,12 @@ impl Outbox {
     fn write_all(&self, entries: &[Entry], files: &[(Entry, Vec<u8>)]) -> Result<(), OutboxError> {
         let mut open = Vec::with_capacity(files.len());
         for (entry, (_, bytes)) in entries.iter().zip(files) {
-            let path = self.folders.waiting(entry.sequence);
-            let unfinished = durable::unfinished(&path);
-            open.push((durable::write(&unfinished, bytes)?, unfinished, path));
+            let unfinished = durable::unfinished(&self.folders.waiting(entry.sequence));
+            open.push((durable::write(&unfinished, bytes)?, unfinished));
         }
-        for (file, unfinished, _) in &open {
-            file.sync_data().map_err(at(unfinished))?;
-        }
-        for (_, unfinished, path) in &open {
-            durable::rename(unfinished, path)?;
+        durable::sync_together(&open)?;
+        for (entry, (_, unfinished)) in entries.iter().zip(&open) {
+            durable::rename(unfinished, &self.folders.waiting(entry.sequence))?;
         }
         durable::sync_folder(&self.folders.queue())?;
         Ok(())

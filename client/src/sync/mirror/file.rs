@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use uuid::Uuid;
 
-use super::{Copy, Ground, MirrorError};
+use super::{Ground, KnownMap, MirrorError};
 use crate::sync::LevelAddress;
 use crate::sync::durable::{self, DiskError, at};
 
@@ -34,7 +34,7 @@ const ZSTD_LEVEL: i32 = 3;
 pub(super) struct Saved {
     pub(super) level: LevelAddress,
     pub(super) ground: Ground,
-    pub(super) copy: Copy,
+    pub(super) known: KnownMap,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -81,14 +81,14 @@ fn path(folder: &Path) -> PathBuf {
 }
 
 fn encode(saved: &Saved) -> Result<io::Result<Vec<u8>>, codec::EncodeError> {
-    let Saved { level, ground, copy } = saved;
-    let patch = diff(&LevelMap::default(), &copy.map);
+    let Saved { level, ground, known } = saved;
+    let patch = diff(&LevelMap::default(), &known.map);
     let content = Content {
         site: level.site.clone(),
         level: level.level.clone(),
         frame: ground.frame,
         resolution_m: ground.resolution_m,
-        map: wire_patch(&patch, 0, copy.revision, false),
+        map: wire_patch(&patch, 0, known.revision, false),
     };
     let cbor = codec::to_cbor(&content)?;
     Ok(zstd::bulk::compress(&cbor, ZSTD_LEVEL).map(|payload| {
@@ -119,6 +119,6 @@ fn decode(bytes: &[u8]) -> Result<Saved, String> {
     Ok(Saved {
         level: LevelAddress { site: content.site, level: content.level },
         ground: Ground { frame: content.frame, resolution_m: content.resolution_m },
-        copy: Copy { revision: content.map.revision, map },
+        known: KnownMap { revision: content.map.revision, map },
     })
 }

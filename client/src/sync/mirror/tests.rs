@@ -101,6 +101,36 @@ async fn a_server_that_was_set_back_is_noticed_and_followed() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_server_that_was_set_back_and_went_another_way_is_noticed_by_its_counts() {
+    let stub = with_contributions(0..20);
+    let folder = tempfile::tempdir().unwrap();
+    let mut mirror = open(&folder);
+    mirror.refresh(&api_of(&stub)).await.unwrap();
+    stub.ledger().set_back(12);
+    // Other walls than before, and more revisions than the mirror knows.
+    stub.ledger().take(&contributions(100..110));
+    let refreshed = mirror.refresh(&api_of(&stub)).await.unwrap();
+    assert_eq!(refreshed.resync, Some(ResyncReason::Diverged));
+    assert_eq!(mirror.revision(), 22);
+    assert_eq!(mirror.map(), stub.ledger().map());
+    assert_eq!(mirror.refresh(&api_of(&stub)).await.unwrap().resync, None);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn counts_that_never_fit_are_believed_once() {
+    let stub = with_contributions(0..3);
+    stub.ledger().counts = Some(v1::Counts { segments: 99, ..v1::Counts::default() });
+    let folder = tempfile::tempdir().unwrap();
+    let mut mirror = open(&folder);
+    let refreshed = mirror.refresh(&api_of(&stub)).await.unwrap();
+    assert_eq!(refreshed.resync, Some(ResyncReason::Diverged));
+    stub.ledger().take(&contributions(3..5));
+    let refreshed = mirror.refresh(&api_of(&stub)).await.unwrap();
+    assert_eq!((refreshed.resync, refreshed.to_revision), (None, 5));
+    assert_eq!(mirror.map(), stub.ledger().map());
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_level_that_was_made_anew_is_noticed_by_its_frame() {
     let stub = with_contributions(0..5);
     let folder = tempfile::tempdir().unwrap();

@@ -380,8 +380,6 @@ fn queue_files() -> Vec<(String, Vec<u8>)> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
-
     #[test]
     fn a_mutated_outbox_sends_what_is_whole_and_nothing_else(
         mutations in prop::collection::vec(mutation(), 1..6),

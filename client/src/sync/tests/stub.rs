@@ -81,6 +81,8 @@ pub(in crate::sync) struct Ledger {
     pub(in crate::sync) bytes_in: u64,
     /// Pages of patches that were asked for.
     pub(in crate::sync) pages: usize,
+    /// What the level is said to hold, if not what it holds.
+    pub(in crate::sync) counts: Option<v1::Counts>,
     in_hand: usize,
     receipts: BTreeMap<Uuid, v1::Receipt>,
     /// The map at each revision, from 0 on; every acknowledged contribution is one revision.
@@ -103,6 +105,7 @@ impl Ledger {
             busiest: 0,
             bytes_in: 0,
             pages: 0,
+            counts: None,
             in_hand: 0,
             receipts: BTreeMap::new(),
             history: vec![Level::new(LevelConfig::standard(RESOLUTION_M))],
@@ -395,10 +398,19 @@ async fn describe(State(shared): State<Shared>, headers: HeaderMap) -> Response 
             revision: ledger.revision(),
             folded_revision: ledger.revision(),
             bounds: None,
-            counts: v1::Counts::default(),
+            counts: ledger.counts.unwrap_or_else(|| counts(ledger.map())),
             published: None,
         },
     )
+}
+
+fn counts(map: &LevelMap) -> v1::Counts {
+    v1::Counts {
+        contributions: 0,
+        segments: map.segments.len() as i64,
+        clusters: map.clusters.len() as i64,
+        tiles: map.tiles.len() as i64,
+    }
 }
 
 #[derive(serde::Deserialize)]

