@@ -115,3 +115,22 @@ fn sensors(text: &str) -> Result<mapfold_client::sensor::Sensors, String> {
     })?;
     Sensors::from_toml(&file).map_err(|error| error.to_string())
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_makes_sense() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn a_sensor_is_a_preset_or_a_file_or_said_to_be_neither() {
+        assert!(sensors("sick-lms").is_ok_and(|s| s.scanner.is_some()));
+        let error = sensors("no-such-sensor").unwrap_err();
+        assert!(error.contains("hokuyo-urg"), "{error}");
+    }
+}

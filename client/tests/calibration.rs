@@ -1,6 +1,5 @@
 //! Whether the noise that a preset claims is the noise that a real log has: residuals of long
 //! walls over their claimed deviations.
-#![expect(clippy::unwrap_used, reason = "tests stop at the first surprise")]
 
 use std::path::PathBuf;
 

@@ -193,6 +193,21 @@ async fn emulated_sonar_is_declared_and_labelled_as_such() {
 }
 
 #[tokio::test]
+async fn a_robot_that_comes_back_with_other_sensors_is_enrolled_with_them() {
+    let (server, folder) = (Server::start(TOKEN).await, tempfile::tempdir().unwrap());
+    let few = Window { from: None, to: Some(Cut::Share(0.001)) };
+    let scanner = ReplayOptions { window: few, ..options(folder.path()) };
+    assert!(play(scanner.clone(), &server.url, TOKEN).await.unwrap().complete);
+    let sensors = SensorChoice { emulate_sonar: true, ..SensorChoice::default() };
+    let sonar = ReplayOptions { sensors, ..scanner };
+    assert!(play(sonar, &server.url, TOKEN).await.unwrap().complete);
+    let world = server.world.lock().unwrap();
+    assert_eq!(world.robots["anna"].sensors[0].kind, v1::SensorKind::Sonar);
+    // What a scanner saw and what sonar heard from the same places are different contributions.
+    assert_eq!(world.taken.len(), 8);
+}
+
+#[tokio::test]
 async fn a_paced_replay_takes_its_time() {
     let (server, folder) = (Server::start(TOKEN).await, tempfile::tempdir().unwrap());
     let mut options = options(folder.path());

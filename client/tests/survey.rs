@@ -5,12 +5,13 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
+use mapfold_client::emulation::{Chance, EmulationConfig, emulate};
 use mapfold_client::log::{Log, Observation, ScannerMake, carmen};
 use mapfold_client::perception::{self, BeamUse};
 use mapfold_client::robot::{
     Look, OdometryNoise, Passed, PoseSd, PoseSource, Surveyor, SurveyorConfig,
 };
-use mapfold_client::sensor::{Sensors, preset};
+use mapfold_client::sensor::{Ring, Sensors, preset};
 use mapfold_map::level::Provenance;
 use mapfold_map::raster::SensorClass;
 use mapfold_schema::border::{DEFAULT_LIMITS, Target, check_contribution};
@@ -117,7 +118,32 @@ fn a_real_ring_of_sonars_gives_evidence_only() {
 }
 
 #[test]
-fn emulated_sonar_says_so_and_is_as_silent_as_the_real_ring() {
+fn emulated_sonar_is_as_silent_as_the_real_ring() {
+    let silent = |rings: &[Ring]| {
+        let sonars = || rings.iter().flat_map(|ring| &ring.sonars);
+        sonars().filter(|s| s.range.is_none()).count() as f64 / sonars().count() as f64
+    };
+    let profile = preset("sonar-ring").unwrap().sonar.unwrap();
+    let (mut real, mut emulated) = (Vec::new(), Vec::new());
+    for reading in log("corridor-ring8.log.gz").readings {
+        let Observation::Ring(mut ring) = reading.observation else { continue };
+        for sonar in &mut ring.sonars {
+            sonar.range = sonar.range.filter(|r| *r < profile.range_max_m);
+        }
+        real.push(ring);
+    }
+    for reading in log("killian.log.gz").readings.iter().step_by(10) {
+        let Observation::Scan(scan) = &reading.observation else { continue };
+        let mut chance = Chance::new(u64::from(reading.index));
+        emulated.push(emulate(scan, &profile, &EmulationConfig::STANDARD, &mut chance));
+    }
+    let (real, emulated) = (silent(&real), silent(&emulated));
+    assert!((real - 0.33).abs() < 0.02, "{real}");
+    assert!((emulated - real).abs() < 0.1, "emulated {emulated}, real {real}");
+}
+
+#[test]
+fn emulated_sonar_says_so_and_is_the_same_every_time() {
     let mut log = log("killian.log.gz");
     log.readings.truncate(200);
     let emulated =

@@ -83,7 +83,7 @@ fn in_words<'a>(all: impl Iterator<Item = &'a Features>) -> String {
     }
     let percent = |n: u32| 100.0 * f64::from(n) / f64::from(points.max(1));
     format!(
-        "{scans} scans: {segments} segments, {clusters} clusters; of {points} end points {:.1} % \
+        "scans: {scans}; segments: {segments}; clusters: {clusters}; of {points} end points {:.1} % \
          lie on segments, {:.1} % in clusters",
         percent(on_wall),
         percent(in_cluster)

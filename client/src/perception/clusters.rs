@@ -219,7 +219,7 @@ mod tests {
             (2.0, 0.95),
             (2.05, 1.15),
         ]);
-        let found = clusters(&points, &[0..6], &CONFIG);
+        let found = clusters(&points, std::slice::from_ref(&(0..6)), &CONFIG);
         let members: Vec<_> = found.iter().map(|c| c.members.clone()).collect();
         assert_eq!(members, [vec![0, 1, 2], vec![3, 4, 5]]);
     }

@@ -81,7 +81,9 @@ impl Enrolment<'_> {
             }
             other => other,
         };
-        let level = level.map_err(name("cannot open level"))?;
+        let hint =
+            if *create { "cannot open level" } else { "without --create, cannot open level" };
+        let level = level.map_err(name(hint))?;
         if *create {
             let of_robot = |error| (format!("cannot enrol robot {robot}"), error);
             match api.robot(&address.site, robot).await {

@@ -73,9 +73,9 @@ mod tests {
     use std::io::Cursor;
 
     fn log() -> Log {
-        let lines: String =
+        let lines: Vec<String> =
             (0..10).map(|i| format!("FLASER 1 2.0 0 0 0 0 0 0 {} h 0\n", 100 + 10 * i)).collect();
-        read_from(Cursor::new(lines.into_bytes())).unwrap()
+        read_from(Cursor::new(lines.concat().into_bytes())).unwrap()
     }
 
     fn select(from: Option<&str>, to: Option<&str>) -> Vec<u32> {

@@ -60,7 +60,7 @@ impl Server {
             .route(route::LEVELS, post(create_level))
             .route(route::LEVEL, get(level))
             .route(route::ROBOTS, post(create_robot))
-            .route(route::ROBOT, get(robot))
+            .route(route::ROBOT, get(robot).patch(update_robot))
             .route(route::CONTRIBUTIONS, post(contribute))
             .with_state(Arc::clone(&world));
         let task = tokio::spawn(async move { axum::serve(listener, app).await.unwrap() });
@@ -174,6 +174,21 @@ async fn robot(State(world): Shared, Path((_, name)): Path<(String, String)>) ->
         .robots
         .get(&name)
         .map_or_else(|| problem(404, "robot_not_found"), |r| Json(described(r)).into_response())
+}
+
+async fn update_robot(
+    State(world): Shared,
+    Path((_, name)): Path<(String, String)>,
+    headers: HeaderMap,
+    body: Bytes,
+) -> Response {
+    let update: v1::RobotUpdate = decode(&headers, &body);
+    let mut world = world.lock().unwrap();
+    let Some(robot) = world.robots.get_mut(&name) else { return problem(404, "robot_not_found") };
+    if let Some(sensors) = update.sensors {
+        robot.sensors = sensors;
+    }
+    Json(described(robot)).into_response()
 }
 
 fn described(robot: &v1::NewRobot) -> v1::RobotDescription {
