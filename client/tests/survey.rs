@@ -16,6 +16,7 @@ use mapfold_map::level::Provenance;
 use mapfold_map::raster::SensorClass;
 use mapfold_schema::border::{DEFAULT_LIMITS, Target, check_contribution};
 use mapfold_schema::codec::to_cbor;
+use proptest::prelude::*;
 use uuid::Uuid;
 
 const FRAME: Uuid = Uuid::from_u128(7);
@@ -182,4 +183,57 @@ fn readings_without_what_the_surveyor_needs_are_passed_over_with_a_reason() {
     config.sensors = preset("sonar-ring").unwrap();
     let mut surveyor = Surveyor::new(config, 0).unwrap();
     assert_eq!(surveyor.survey(&killian.readings[0]), Err(Passed::OtherSensor));
+}
+
+/// One range: mostly somewhere in a room, sometimes what broken sensors give.
+fn range() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        6 => 0.05..12.0,
+        2 => 1.9..2.1,
+        1 => prop_oneof![
+            Just(0.0), Just(-1.0), Just(50.0), Just(1e300), Just(f64::NAN), Just(f64::INFINITY),
+            Just(1e-12), Just(f64::MIN_POSITIVE)
+        ],
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn whatever_a_scanner_gives_the_server_takes(
+        ranges in prop::collection::vec(range(), 0..400),
+        (x, y, heading) in (-500.0..500.0, -500.0..500.0, -4.0..4.0),
+        (mount_x, mount_heading) in (-1.0..1.0, -4.0..4.0),
+    ) {
+        let ranges: Vec<String> = ranges.iter().map(f64::to_string).collect();
+        // The scanner's own pose, ahead of the robot's and turned.
+        let line = format!(
+            "ROBOTLASER1 0 -3.14159265 6.2831853 {} 50 0.1 0 {} {} 0 {} {y} {} {x} {y} {heading} \
+             0 0 0 0 0 7 h 7\n",
+            std::f64::consts::TAU / ranges.len().max(8) as f64,
+            ranges.len(),
+            ranges.join(" "),
+            x + mount_x,
+            heading + mount_heading,
+        );
+        let log = carmen::read_from(std::io::Cursor::new(line.into_bytes())).unwrap();
+        assert_valid(&survey(&log, &config(&log, preset("sick-lms").unwrap())));
+        let emulated =
+            SurveyorConfig { emulate_sonar: true, ..config(&log, preset("sonar-ring").unwrap()) };
+        assert_valid(&survey(&log, &emulated));
+    }
+
+    #[test]
+    fn whatever_a_log_holds_reading_it_ends_well(
+        bytes in prop::collection::vec(any::<u8>(), 0..300),
+        lines in prop::collection::vec("(FLASER|ODOM|SONAR|ROBOTLASER1|PARAM|#)( -?[0-9e.]{1,6}| nan){0,20}", 0..20),
+    ) {
+        let read = |bytes: Vec<u8>| carmen::read_from(std::io::Cursor::new(bytes));
+        let _ = read(bytes.clone());
+        let _ = read([&[0x1f, 0x8b], bytes.as_slice()].concat());
+        if let Ok(log) = read(lines.join("\n").into_bytes()) {
+            prop_assert!(log.readings.len() as u64 == log.summary.scans + log.summary.rings);
+        }
+    }
 }
