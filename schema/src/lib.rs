@@ -12,6 +12,7 @@
 //! * [`border`]: limits, violations, and the way into `mapfold_map` types.
 //! * [`codec`]: JSON and CBOR.
 //! * [`digest`]: by what a contribution's content is known.
+//! * [`geojson`]: the published map for other programs, as the server exports and mirrors write it.
 //! * [`instant`]: RFC 3339 and microseconds.
 //! * `malformed` (with the feature of that name): a catalogue of contributions to refuse.
 //! * [`problem`]: RFC 9457 problems.
@@ -20,6 +21,7 @@
 pub mod border;
 pub mod codec;
 pub mod digest;
+pub mod geojson;
 pub mod instant;
 #[cfg(feature = "malformed")]
 pub mod malformed;

@@ -7,7 +7,6 @@
 //! the same revision with as many segments, clusters and tiles.)
 
 mod file;
-mod geojson;
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -17,6 +16,7 @@ use std::time::Duration;
 use mapfold_map::level::{LevelMap, apply};
 use mapfold_schema::border::{Violation, map_patch};
 use mapfold_schema::codec::EncodeError;
+use mapfold_schema::geojson;
 use mapfold_schema::v1;
 use rand::Rng;
 use tokio::sync::watch;

@@ -7,11 +7,12 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
+use mapfold_schema::geojson;
+
 use super::args::{ExportCommand, ExportFormat};
 use super::{CommandError, say};
 use crate::clock::SystemClock;
 use crate::config::Config;
-use crate::exchange::geojson;
 use crate::exchange::nav2::{IMAGE_NAME, Nav2Map};
 use crate::level::{LevelOptions, Levels, Snapshot};
 use crate::running::open_store;

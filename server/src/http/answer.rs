@@ -10,12 +10,12 @@ use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderValue, StatusCode};
 use axum::response::{IntoResponse, Response};
 use mapfold_schema::codec;
+use mapfold_schema::geojson;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use uuid::Uuid;
 
 use super::problem::ApiError;
-use crate::exchange::geojson;
 
 /// Names the revision of the map that an answer shows.
 pub(super) const REVISION_HEADER: &str = "mapfold-revision";

@@ -6,6 +6,7 @@ use axum::extract::{Path, State};
 use axum::http::HeaderValue;
 use axum::http::header::CONTENT_DISPOSITION;
 use axum::response::Response;
+use mapfold_schema::geojson;
 use mapfold_schema::route;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
@@ -14,7 +15,7 @@ use super::access::{LevelFor, Read};
 use super::answer::Reader;
 use super::problem::ApiError;
 use super::state::App;
-use crate::exchange::{geojson, nav2};
+use crate::exchange::nav2;
 use crate::level::Snapshot;
 
 /// Media type of a zip.

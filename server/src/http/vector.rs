@@ -2,6 +2,7 @@
 
 use axum::response::Response;
 use mapfold_schema::codec;
+use mapfold_schema::geojson;
 use mapfold_schema::route;
 use mapfold_schema::v1::VectorPatch;
 
@@ -9,7 +10,6 @@ use super::access::{LevelFor, Read};
 use super::answer::{DATA_OR_GEOJSON, Reader};
 use super::problem::ApiError;
 use super::query::{QueryOf, SinceInBox};
-use crate::exchange::geojson;
 
 /// Segments and clusters that changed after `since`, and the ids of those that are no more.
 ///

@@ -10,8 +10,9 @@ use mapfold_map::geometry::{Covariance, Interval, Line, Point};
 use mapfold_map::level::{ContributionId, FeatureId, LevelMap};
 use mapfold_map::raster::{SensorClass, TILE_CELLS, Tile, TileIndex, TileKey};
 use mapfold_map::vector::{Cluster, EndKind, Facing, Segment, SolidInterval};
+use mapfold_schema::geojson;
 use mapfold_schema::route;
-use mapfold_server::exchange::{geojson, nav2::Nav2Map};
+use mapfold_server::exchange::nav2::Nav2Map;
 
 use crate::server::Server;
 use crate::world::Level;

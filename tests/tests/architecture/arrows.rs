@@ -75,6 +75,7 @@ const MODULES: &[(&str, &[ModuleRule])] = &[
             ("border", &["instant", "slug", "v1"]),
             ("codec", &["border::Violation", "v1"]),
             ("digest", &["codec", "v1"]),
+            ("geojson", &["border", "v1"]),
             ("malformed", &["border", "v1"]),
         ],
     ),

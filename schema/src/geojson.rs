@@ -8,9 +8,10 @@ use std::io::{self, Write};
 
 use mapfold_map::geometry::Line;
 use mapfold_map::level::LevelMap;
-use mapfold_schema::border::{wire_cluster, wire_segment};
-use mapfold_schema::v1;
 use serde::Serialize;
+
+use crate::border::{wire_cluster, wire_segment};
+use crate::v1;
 
 /// Media type of GeoJSON.
 pub const MEDIA_TYPE: &str = "application/geo+json";
