@@ -22,16 +22,18 @@ mod dialect;
 mod engine;
 mod error;
 mod row;
+mod transaction;
 mod values;
 
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use sqlx::{Any, AnyPool, Transaction};
+use sqlx::AnyPool;
 
 use dialect::Dialect;
 use engine::Pools;
+use transaction::Tx;
 
 pub use engine::sqlite_url;
 pub use error::StoreError;
@@ -123,13 +125,13 @@ impl Store {
     }
 
     /// A transaction that writes.
-    async fn begin_write(&self) -> Result<Transaction<'static, Any>, StoreError> {
-        Ok(self.inner.pools.writers.begin_with(self.inner.dialect.begin_write).await?)
+    async fn begin_write(&self) -> Result<Tx, StoreError> {
+        Tx::begin(&self.inner.pools.writers, self.inner.dialect.begin_write).await
     }
 
     /// A transaction whose reads all see the same state.
-    async fn begin_read(&self) -> Result<Transaction<'static, Any>, StoreError> {
-        Ok(self.inner.pools.readers.begin_with(self.inner.dialect.begin_read).await?)
+    async fn begin_read(&self) -> Result<Tx, StoreError> {
+        Tx::begin(&self.inner.pools.readers, self.inner.dialect.begin_read).await
     }
 }
 

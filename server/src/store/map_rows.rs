@@ -5,9 +5,9 @@
 
 use mapfold_map::raster::{SensorClass, TileIndex, TileKey};
 use sqlx::any::AnyRow;
-use sqlx::{Any, Transaction};
 
 use super::row::{corrupt, get};
+use super::transaction::Tx;
 use super::values::{Bulk, bulk};
 use super::{Store, StoreError, retried};
 
@@ -221,7 +221,7 @@ impl Store {
 }
 
 async fn upsert_features(
-    tx: &mut Transaction<'static, Any>,
+    tx: &mut Tx,
     site: &str,
     level: &str,
     upsert: &Bulk,

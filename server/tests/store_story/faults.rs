@@ -10,7 +10,10 @@ use crate::engines::{Database, Engine, run};
 use crate::levels_in_memory::{clock, open, reached, still, submit_all};
 use crate::synthetic::{LEVEL, SITE, accepted, folded, furnish, looks, new_level};
 
-on_each_engine!(a_spoilt_row_closes_its_level_and_no_other);
+on_each_engine!(
+    a_spoilt_row_closes_its_level_and_no_other,
+    what_the_engine_refuses_harms_neither_its_neighbours_nor_what_comes_after,
+);
 
 /// PostgreSQL only: an SQLite file has no connections that could be cut.
 #[test]
@@ -106,6 +109,37 @@ async fn a_spoilt_row_closes_its_level_and_no_other(database: Database) {
     let level = levels.open(SITE, LEVEL).await.unwrap().unwrap();
     assert_eq!(level.submit(accepted(&all[10])).await.unwrap().revision, 11);
     assert_eq!(&*reached(&level, 11).await.map(), folded(&all).map());
+}
+
+async fn what_the_engine_refuses_harms_neither_its_neighbours_nor_what_comes_after(
+    database: Database,
+) {
+    let store = database.store().await;
+    furnish(&store).await;
+    let (_levels, level) = open(&store, still()).await;
+    let all = looks(53, 9);
+    submit_all(&level, &all[..3]).await;
+    let (forbid, allow) = match database.engine {
+        // As on a full disk, SQLite rolls back by itself.
+        Engine::Sqlite => (
+            "create trigger no_bert before insert on contributions when new.robot = 'bert' \
+             begin select raise(rollback, 'no bert'); end",
+            "drop trigger no_bert",
+        ),
+        Engine::Postgres => (
+            "alter table contributions add constraint no_bert check (robot <> 'bert') not valid",
+            "alter table contributions drop constraint no_bert",
+        ),
+    };
+    database.meddle(forbid).await;
+    let answers = level.submit_many(all[3..6].iter().map(accepted).collect()).await;
+    assert_eq!(answers[0].as_ref().unwrap().revision, 4);
+    assert!(matches!(answers[1], Err(SubmitError::Unavailable(_))), "{:?}", answers[1]);
+    assert_eq!(answers[2].as_ref().unwrap().revision, 5);
+    database.meddle(allow).await;
+    let snapshot = submit_all(&level, &all).await;
+    assert_eq!(snapshot.folded_revision(), 9);
+    assert_eq!(&*snapshot.map(), folded(&all).map());
 }
 
 /// Whether the level is dropped from memory soon.
