@@ -149,6 +149,7 @@ export function createMapView(options: MapViewOptions): MapView {
   /** What the page itself has last set; anything else is the operator's doing. */
   let applied: { centre: Point; resolution: number } | null = null;
   let fitted: Box | null = null;
+  /** The state's view that the map has taken over, or that came from it. */
   let drawnView: State["view"] | null = null;
 
   const centre = (): Point => {
@@ -191,25 +192,43 @@ export function createMapView(options: MapViewOptions): MapView {
     remember();
   };
 
-  const drawView = (before: State): void => {
+  const drawView = (): void => {
+    const asked = state.view !== drawnView;
+    drawnView = state.view;
+    if (asked) {
+      fitted = null;
+      view.cancelAnimations();
+    }
     if (state.view.kind === "fit") {
-      if (before.view.kind !== "fit" || !samePlace(before.place, state.place)) fitted = null;
       fit();
       return;
     }
-    fitted = null;
-    if (state.view === drawnView) return;
-    drawnView = state.view;
+    if (!asked) return;
     const { xLevelM, yLevelM, resolution: wanted } = state.view;
     applied = { centre: [xLevelM, yLevelM], resolution: wanted };
     if (isApplied()) return;
-    view.cancelAnimations();
     view.setCenter([xLevelM, yLevelM]);
     view.setResolution(wanted);
     remember();
   };
 
+  /** Tells where the operator has moved the map, unless another view was asked for meanwhile. */
+  const tellMoved = (): void => {
+    if (state.place === null || store.state().view !== drawnView) return;
+    const [xLevelM, yLevelM] = centre();
+    remember();
+    drawnView = { kind: "at", xLevelM, yLevelM, resolution: resolution() };
+    store.dispatch({ kind: "view", view: drawnView });
+  };
+  // The page itself moves the map at once; only what the operator does is an interaction or an
+  // animation. Its first step ends the following of the level: a refit would undo it.
+  const leaveFit = (): void => {
+    if (drawnView?.kind === "fit" && (view.getInteracting() || view.getAnimating())) tellMoved();
+  };
+
+  view.on("change:center", leaveFit);
   view.on("change:resolution", () => {
+    leaveFit();
     store.dispatch({ kind: "shown", resolution: resolution() });
   });
   map.on("change:size", () => {
@@ -217,10 +236,7 @@ export function createMapView(options: MapViewOptions): MapView {
     if (state.view.kind === "fit") fit();
   });
   map.on("moveend", () => {
-    if (state.place === null || isApplied()) return;
-    const [xLevelM, yLevelM] = centre();
-    remember();
-    store.dispatch({ kind: "view", view: { kind: "at", xLevelM, yLevelM, resolution: resolution() } });
+    if (!isApplied()) tellMoved();
   });
   map.on("pointermove", ({ coordinate, dragging }) => {
     const [x = 0, y = 0] = coordinate;
@@ -249,7 +265,7 @@ export function createMapView(options: MapViewOptions): MapView {
         layers[name].setVisible(now.layers[name].on);
         layers[name].setOpacity(now.layers[name].opacity);
       }
-      drawView(before);
+      drawView();
       if (drawnFrom(before).some((value, index) => value !== drawnFrom(now)[index])) map.render();
     },
     zoomBy(factor) {

@@ -291,6 +291,127 @@ describe("the operator", () => {
   });
 });
 
+describe("a view that follows the level", () => {
+  const FIT = ".tools button:has-text('Fit')";
+  /** Metres per pixel in the address; null while the view follows the level. */
+  const resolution = (): number | null => {
+    const text = new URLSearchParams(new URL(page.url()).hash.slice(1)).get("resolution");
+    return text === null ? null : Number(text);
+  };
+  /** Length of the scale bar's metres on the screen and in words: it changes with every zoom. */
+  const scale = async (): Promise<string> =>
+    `${await page.locator(".scale .bar").evaluate((bar: HTMLElement) => bar.style.width)} ${await page.innerText(".scale")}`;
+  const follows = async (): Promise<boolean> => (await page.getAttribute(FIT, "aria-pressed")) === "true";
+  /** Metres per pixel that the scale bar says. */
+  const metresPerPixel = async (): Promise<number> => {
+    const [, px = "", length = "", unit = ""] = /^([\d.]+)px ([\d.]+)\s*(cm|m)/.exec(await scale()) ?? [];
+    return (Number(length) * (unit === "cm" ? 0.01 : 1)) / Number(px);
+  };
+  /** The map has stood still for a while, news of the level included. */
+  const settle = async (): Promise<void> => {
+    await page.waitForTimeout(600);
+    mock.step();
+    await caughtUp();
+  };
+  const start = async (): Promise<number> => {
+    await open(SIGNED_IN);
+    await caughtUp();
+    expect(await follows()).toBe(true);
+    expect(resolution()).toBe(null);
+    return metresPerPixel();
+  };
+  const middle = async (): Promise<readonly [number, number]> => {
+    const box = await page.locator("#map").boundingBox();
+    return [(box?.x ?? 0) + (box?.width ?? 0) / 2, (box?.y ?? 0) + (box?.height ?? 0) / 2];
+  };
+  const wheel = async (deltaY: number): Promise<void> => {
+    await page.mouse.move(...(await middle()));
+    await page.mouse.wheel(0, deltaY);
+  };
+  const pinch = async (): Promise<void> => {
+    const [x, y] = await middle();
+    const session = await page.context().newCDPSession(page);
+    const touch = async (type: "touchStart" | "touchMove" | "touchEnd", apart: number): Promise<void> => {
+      const touchPoints = type === "touchEnd" ? [] : [{ x: x - apart, y, id: 0 }, { x: x + apart, y, id: 1 }];
+      await session.send("Input.dispatchTouchEvent", { type, touchPoints });
+    };
+    await touch("touchStart", 40);
+    for (const apart of [50, 65, 80, 100]) await touch("touchMove", apart);
+    await touch("touchEnd", 100);
+  };
+  const WAYS: Record<string, { act: () => Promise<void>; nearer: boolean }> = {
+    "the wheel, inwards": { act: () => wheel(-240), nearer: true },
+    "the wheel, outwards": { act: () => wheel(240), nearer: false },
+    "a touchpad's small steps": { act: () => wheel(-3), nearer: true },
+    "the + button": { act: () => page.click("[aria-label^='Zoom in']"), nearer: true },
+    "the \u2212 button": { act: () => page.click("[aria-label^='Zoom out']"), nearer: false },
+    "the + key": { act: () => page.keyboard.press("+"), nearer: true },
+    "the + key on the map": {
+      act: async () => {
+        await page.focus("#map");
+        await page.keyboard.press("+");
+      },
+      nearer: true,
+    },
+    "two fingers": { act: pinch, nearer: true },
+  };
+
+  it.each(Object.entries(WAYS))("is left by %s, for good", async (_way, { act, nearer }) => {
+    const whole = await start();
+    await act();
+    await settle();
+    expect(await follows()).toBe(false);
+    const zoomed = resolution() ?? NaN;
+    expect(nearer ? zoomed < whole * 0.995 : zoomed > whole * 1.005).toBe(true);
+    expect(await metresPerPixel()).toBeCloseTo(zoomed, 3);
+    await settle();
+    expect(resolution()).toBe(zoomed);
+    expect(complaints).toEqual([]);
+  });
+
+  it("is left by dragging, at the same scale", async () => {
+    await start();
+    const before = await scale();
+    const [x, y] = await middle();
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    await page.mouse.move(x - 60, y - 40, { steps: 4 });
+    await page.waitForFunction(() => window.location.hash.includes("resolution="));
+    await page.mouse.up();
+    await settle();
+    expect(await follows()).toBe(false);
+    expect(await scale()).toBe(before);
+  });
+
+  it("is back when asked for, even while the map still moves", async () => {
+    const whole = await start();
+    await wheel(-480);
+    await settle();
+    expect(await metresPerPixel()).toBeLessThan(whole * 0.9);
+    await page.click("[aria-label^='Zoom in']");
+    await page.click(FIT);
+    await settle();
+    expect(await follows()).toBe(true);
+    expect(resolution()).toBe(null);
+    expect(await metresPerPixel()).toBeGreaterThan(whole * 0.9);
+  });
+
+  it("keeps up with a level that grows", async () => {
+    await mock.close();
+    mock = createMockServer();
+    origin = await mock.listen();
+    mock.step();
+    const early = await start();
+    for (let i = 0; i < 6; i++) {
+      mock.step(5);
+      await caughtUp();
+    }
+    expect(await follows()).toBe(true);
+    expect(resolution()).toBe(null);
+    expect(await metresPerPixel()).toBeGreaterThan(early * 1.05);
+  });
+});
+
 describe("in words", () => {
   it("tells of a level that is empty, and draws it once a robot comes", async () => {
     await open(`${SIGNED_IN}&site=plant&level=upper`);
