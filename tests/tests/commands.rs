@@ -1,16 +1,16 @@
-//! The server's other commands, on the data of a server that has run.
+//! The programs' other commands, on the data of a server that has run.
 
 use std::path::Path;
 
-use mapfold_tests::Error;
 use mapfold_tests::carmen::Log;
 use mapfold_tests::database::Database;
 use mapfold_tests::level::Level;
 use mapfold_tests::robot::{Robot, Target};
 use mapfold_tests::server::Server;
+use mapfold_tests::{Error, programs};
 
 #[tokio::test]
-async fn export_and_backup_hold_what_the_server_showed() -> Result<(), Error> {
+async fn exports_backups_and_mirrors_hold_what_the_server_showed() -> Result<(), Error> {
     let mut server = Server::start(Database::Sqlite).await?;
     let folder = server.folder().to_owned();
     let log = Log::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("data/killian.log.gz"))?;
@@ -27,6 +27,19 @@ async fn export_and_backup_hold_what_the_server_showed() -> Result<(), Error> {
     level.folded().await?;
     let shown = level.export("geojson").await?;
 
+    // A robot's mirror, written out, is the export: both are made of the same map.
+    let mirror = folder.join("mirror");
+    let output = tokio::process::Command::new(programs::path("mapfold-robot")?)
+        .args(["mirror", "--once", "--server", &target.url, "--token", &target.token])
+        .args(["--site", "mit", "--level", "floor", "--out"])
+        .arg(&mirror)
+        .output()
+        .await
+        .map_err(|e| Error::file(&mirror, e))?;
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let read = |path: &Path| std::fs::read(path).map_err(|e| Error::file(path, e));
+    assert!(read(&mirror.join("map.geojson"))? == shown, "the mirror differs from the export");
+
     // A backup may be taken while the server runs.
     let copy = folder.join("copy.db");
     server.command(&["backup", &copy.to_string_lossy()]).await?;
@@ -42,14 +55,13 @@ async fn export_and_backup_hold_what_the_server_showed() -> Result<(), Error> {
         }
     };
     export("geojson", &file).await?;
-    let read = |path: &Path| std::fs::read(path).map_err(|e| Error::file(path, e));
     assert!(read(&file)? == shown, "the export on the command line differs from the one over HTTP");
 
-    let yaml = folder.join("map.yaml");
+    let yaml = folder.join("my.yaml");
     export("nav2", &yaml).await?;
     let text = String::from_utf8_lossy(&read(&yaml)?).into_owned();
-    assert!(text.contains("image: map.pgm") && text.contains("resolution: 0.05"), "{text}");
-    let image = read(&folder.join("map.pgm"))?;
+    assert!(text.contains("image: my.pgm") && text.contains("resolution: 0.05"), "{text}");
+    let image = read(&folder.join("my.pgm"))?;
     assert!(image.starts_with(b"P5") && image.len() > 10_000, "{} bytes", image.len());
 
     let of_copy = format!("sqlite://{}", copy.display());
