@@ -49,7 +49,8 @@
 //! let segment = level.map().segments.values().next().expect("one wall");
 //! assert_eq!(segment.looks, 2);
 //! assert!((segment.line.rho() - 3.0).abs() < 1e-9);
-//! assert_eq!(segment.solid[0].span.length(), 4000);
+//! // 4 m between the outermost ends, each drawn in by what its look does not vouch for.
+//! assert!((3900..4000).contains(&segment.solid[0].span.length()));
 //!
 //! level.unfold([&ada]);
 //! let mut alone = Level::new(LevelConfig::standard(0.05));

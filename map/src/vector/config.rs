@@ -24,6 +24,8 @@ pub struct VectorConfig {
     pub datum_heading_sd: f64,
     /// Cells below this many nats of scanner evidence count as free.
     pub free_below: f64,
+    /// A look vouches for a wall up to this many standard deviations before where it saw it end.
+    pub end_margin: f64,
     /// Scanner evidence that one look gives for a free cell, nats (positive).
     pub free_look: f64,
     /// A wall is seen through where more than this share of the looks at it went through it.
@@ -56,6 +58,7 @@ impl VectorConfig {
         datum_position_sd: 0.01,
         datum_heading_sd: 0.001,
         free_below: -1.0,
+        end_margin: 1.5,
         free_look: 0.4,
         through_share: 0.25,
         seen_through_min: 0.10,

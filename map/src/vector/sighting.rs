@@ -1,6 +1,6 @@
 //! An observed segment moved to the level frame.
 
-use nalgebra::{Matrix2, Matrix2x3, Vector2};
+use nalgebra::{Matrix2, Matrix2x3, RowVector3, Vector2};
 
 use super::leaders::Groupable;
 use super::{Facing, ObservedEnd, ObservedSegment, VectorConfig};
@@ -19,6 +19,8 @@ pub(super) struct Sighting {
     pub(super) half_length: f64,
     /// The ends at `middle - half_length * tangent` and `middle + half_length * tangent`.
     pub(super) ends: [ObservedEnd; 2],
+    /// Variance of the middle's place along the line from the pose's error, square metres.
+    along_variance: f64,
     /// Covariance of (offset, alpha) from errors of this look alone.
     pub(super) independent: Matrix2<f64>,
     /// Covariance of (offset, alpha) from errors that other looks may share.
@@ -60,20 +62,26 @@ impl Sighting {
         let j_offset_pose = Matrix2x3::new(normal.x, normal.y, -along, 0.0, 0.0, 1.0);
         let by_pose = |c: &Covariance<3>| *c.transformed(&j_offset_pose).matrix();
         let mut independent = *segment.line.covariance.transformed(&j_offset_line).matrix();
-        let mut dependent = by_pose(&look.level_from_robot.covariance);
+        let level_covariance = &look.level_from_robot.covariance;
+        let mut dependent = by_pose(level_covariance);
         if look.provenance == Provenance::Datum {
             independent += dependent;
             let position = config.datum_position_sd * config.datum_position_sd;
             let heading = config.datum_heading_sd * config.datum_heading_sd;
             dependent = by_pose(&Covariance::from_variances([position, position, heading]));
         }
+        let direction = tangent(alpha);
+        let across = normal.dot(&(middle - pose.position()));
+        let j_along_pose = RowVector3::new(direction.x, direction.y, across);
+        let along_pose = level_covariance.transformed(&j_along_pose);
         let mut sighting = Self {
             alpha,
             normal,
-            tangent: tangent(alpha),
+            tangent: direction,
             middle,
             half_length: (segment.to - segment.from) * 0.5,
             ends: segment.ends,
+            along_variance: along_pose.matrix()[(0, 0)],
             independent,
             dependent,
             robot: look.robot.clone(),
@@ -104,6 +112,17 @@ impl Sighting {
     pub(super) fn end_points(&self) -> [Point; 2] {
         let half = self.tangent * self.half_length;
         [self.middle - half, self.middle + half]
+    }
+
+    /// The ends of what was surely seen: drawn in by `config.end_margin` standard deviations of
+    /// their places, at most to a quarter of the length. Walls are the union of what looks have seen,
+    /// so that otherwise the look that errs farthest outwards would decide where a wall ends.
+    pub(super) fn sure_ends(&self, config: &VectorConfig) -> [Point; 2] {
+        let [from, to] = self.ends.map(|end| {
+            let sd = (end.sd * end.sd + self.along_variance).sqrt();
+            self.half_length - (config.end_margin * sd).min(0.5 * self.half_length)
+        });
+        [self.middle - self.tangent * from, self.middle + self.tangent * to]
     }
 
     /// Offset from `anchor` and lever from the own middle to it.

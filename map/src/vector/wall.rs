@@ -49,7 +49,8 @@ impl Wall {
         let (mut looks, mut first_seen_us, mut last_seen_us) = (0, i64::MAX, i64::MIN);
         for (id, sighting) in group {
             let [a, b] = sighting.end_points().map(|p| line.along(&p));
-            let span = Interval::from_metres(a, b);
+            let [sure_a, sure_b] = sighting.sure_ends(config).map(|p| line.along(&p));
+            let span = Interval::from_metres(sure_a, sure_b);
             seen.push(span);
             covers.extend([(span.from, 1), (span.to, -1)]);
             ends.push(((a * 1e3).round() as i64, sighting.ends[0].kind));
