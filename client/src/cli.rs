@@ -1,6 +1,7 @@
 //! The command line: words into options, outcomes into words and an exit status.
 //!
-//! 0: all was done, for a replay also acknowledged. 1: it was not. 2: the command makes no sense.
+//! 0: all was done, for a replay also acknowledged. 1: it was not, or the log is cut short (what it
+//! still holds is done). 2: the command makes no sense.
 //! 130: interrupted; what waits in the outbox goes on waiting.
 
 mod extract;

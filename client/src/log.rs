@@ -10,6 +10,9 @@ use mapfold_map::geometry::{Level, Odom, Pose, Robot};
 
 use crate::sensor::{Ring, Scan};
 
+/// Malformed lines that people are told of one by one.
+const FAULTS_TOLD: usize = 5;
+
 /// What a reading holds.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Observation {
@@ -64,6 +67,30 @@ pub struct Summary {
     pub malformed: u64,
     /// The first of them.
     pub faults: Vec<carmen::LineError>,
+    /// What cut the file short, if anything; what came before it was read as ever.
+    pub cut_short: Option<String>,
+}
+
+impl Summary {
+    /// What is wrong with the file, for people, a line each; nothing for a sound one.
+    pub fn damage(&self) -> Vec<String> {
+        let mut told = Vec::new();
+        if self.malformed > 0 {
+            let (malformed, lines) = (self.malformed, self.lines);
+            told.push(format!(
+                "{malformed} of {lines} lines of the log are malformed and are passed over"
+            ));
+            told.extend(self.faults.iter().take(FAULTS_TOLD).map(|fault| format!("  {fault}")));
+            let rest = malformed.saturating_sub(self.faults.len().min(FAULTS_TOLD) as u64);
+            if rest > 0 {
+                told.push(format!("  and {rest} more"));
+            }
+        }
+        if let Some(reason) = &self.cut_short {
+            told.push(format!("the log is cut short: {reason}"));
+        }
+        told
+    }
 }
 
 /// A whole log.

@@ -101,6 +101,8 @@ pub struct ReplayProgress {
     pub known: u64,
     /// How the upload is doing.
     pub upload: UploadProgress,
+    /// What is wrong with the log, for people, a line each.
+    pub damage: Vec<String>,
     /// Why it does not get on before the upload starts; absent while all is well.
     pub trouble: Option<String>,
 }
@@ -181,6 +183,7 @@ pub async fn run(
     }
     let path = options.log.clone();
     let log = worker(move || carmen::read(path)).await??;
+    progress.send_modify(|p| p.damage = log.summary.damage());
     let sensors = options.sensors.choose(&log)?;
     let window = options.window;
     let total = log.readings.len();
@@ -206,12 +209,13 @@ pub async fn run(
     }
 
     let surveyor = Surveyor::new(config(level.resolution_m), first)?;
+    let of_log = log.summary.clone();
     let producer = Producer::new(log, numbers, surveyor, level.frame, Arc::clone(&outbox));
     let uploader =
         Uploader::new(api.clone(), Arc::clone(&outbox), options.level.clone(), options.upload);
     let (surveyed, summary) = play(producer, &uploader, options.speed, &mut rng, progress).await?;
-    let report = Report::new(&options, &surveyed, &summary, started.elapsed());
-    if surveyed.placed == 0 && report.complete {
+    let report = Report::new(&options, &of_log, &surveyed, &summary, started.elapsed());
+    if surveyed.placed == 0 && report.trouble.is_none() {
         return Err(ReplayError::NothingPlaced(surveyed.why_nothing()));
     }
     Ok(report)

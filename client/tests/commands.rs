@@ -1,8 +1,15 @@
 //! The program itself, on the command line: what it writes and with which status it ends.
 #![expect(clippy::unwrap_used, reason = "tests stop at the first surprise")]
 
+#[expect(dead_code, reason = "these tests need a server that works, not one that fails")]
+#[path = "worlds/server.rs"]
+mod server;
+
+use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+
+use server::Server;
 
 fn robot(arguments: &[&str], folder: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_mapfold-robot"))
@@ -88,4 +95,96 @@ fn what_cannot_be_done_is_said_with_a_status() {
         assert!(said.contains(reason), "{reason:?} is not in {said}");
     }
     assert!(!folder.path().join("o").exists());
+}
+
+/// Beginning of a log of scans, as text.
+fn text(lines: usize) -> String {
+    let file = std::fs::File::open(log("killian.log.gz")).unwrap();
+    let mut whole = String::new();
+    flate2::read::GzDecoder::new(file).read_to_string(&mut whole).unwrap();
+    whole.lines().take(lines).map(|line| line.to_owned() + "\n").collect()
+}
+
+/// A log of which the end is missing.
+fn cut_short(folder: &Path) -> PathBuf {
+    let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    gzip.write_all(text(120).as_bytes()).unwrap();
+    let mut packed = gzip.finish().unwrap();
+    packed.truncate(packed.len() / 2);
+    let file = folder.join("cut.log.gz");
+    std::fs::write(&file, packed).unwrap();
+    file
+}
+
+/// A log that ends as it should, with seven lines in it that cannot be read.
+fn with_broken_lines(folder: &Path) -> PathBuf {
+    let broken = (0..7).map(|n| format!("FLASER {} 1\n", 90 + n)).collect::<String>();
+    let file = folder.join("broken.log");
+    std::fs::write(&file, format!("{broken}{}", text(40))).unwrap();
+    file
+}
+
+/// Replays `log` against a server that works; what the program said, its report, and how many
+/// contributions the server then has.
+async fn replayed(log: &Path, folder: &Path) -> (Output, serde_json::Value, u64) {
+    let server = Server::start("secret").await;
+    let arguments: [&[&str]; 3] = [
+        &["replay", log.to_str().unwrap(), "--create", "--robot", "r", "--outbox", "outbox"],
+        &["--server", &server.url, "--token", "secret", "--site", "s", "--level", "l"],
+        &["--report", "report.json"],
+    ];
+    let output = robot(&arguments.concat(), folder);
+    let report = std::fs::read(folder.join("report.json")).unwrap();
+    let taken = server.world.lock().unwrap().taken.len() as u64;
+    (output, serde_json::from_slice(&report).unwrap(), taken)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_log_that_is_cut_short_is_replayed_as_far_as_it_goes_and_is_no_success() {
+    let folder = tempfile::tempdir().unwrap();
+    let (output, report, taken) = replayed(&cut_short(folder.path()), folder.path()).await;
+    let said = words(&output);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("the log is cut short: cannot read on after line "), "{said}");
+    assert!(said.contains("so what came after is missing from the map"), "{said}");
+    assert!(taken > 10, "{taken} contributions: {said}");
+    assert_eq!((&report["acknowledged"], &report["waiting"]), (&taken.into(), &0.into()));
+    assert_eq!(report["complete"], false);
+    assert!(report["cut_short"].as_str().unwrap().starts_with("cannot read on"), "{report}");
+    assert_eq!((&report["malformed_lines"], report["trouble"].is_null()), (&0.into(), true));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn broken_lines_of_a_log_are_told_and_the_rest_is_a_success() {
+    let folder = tempfile::tempdir().unwrap();
+    let (output, report, taken) = replayed(&with_broken_lines(folder.path()), folder.path()).await;
+    let said = words(&output);
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("7 of 47 lines of the log are malformed"), "{said}");
+    assert!(said.contains("line 1: ") && said.contains("line 5: "), "{said}");
+    assert!(!said.contains("line 6: ") && said.contains("and 2 more"), "{said}");
+    assert!(taken > 10, "{taken} contributions: {said}");
+    assert_eq!((&report["malformed_lines"], &report["complete"]), (&7.into(), &true.into()));
+    assert!(report["cut_short"].is_null(), "{report}");
+}
+
+#[test]
+fn extract_tells_of_a_damaged_log_and_writes_what_can_be_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = [
+        (cut_short(folder.path()), 1, "before the log was cut short"),
+        (with_broken_lines(folder.path()), 0, "7 of 47 lines of the log are malformed"),
+    ];
+    for (log, status, reason) in table {
+        let out = folder.path().join("features.geojson");
+        let arguments = ["extract", log.to_str().unwrap(), "--out", out.to_str().unwrap()];
+        let output = robot(&arguments, folder.path());
+        let said = words(&output);
+        assert_eq!(output.status.code(), Some(status), "{said}");
+        assert!(said.contains(reason), "{reason:?} is not in {said}");
+        let written = std::fs::read(&out).unwrap();
+        let written: serde_json::Value = serde_json::from_slice(&written).unwrap();
+        assert!(written["features"].as_array().unwrap().len() > 10, "{said}");
+        std::fs::remove_file(out).unwrap();
+    }
 }

@@ -31,6 +31,7 @@ pub(super) struct Extract {
 impl Extract {
     pub(super) fn run(self) -> Result<ExitCode, Box<dyn std::error::Error>> {
         let log = carmen::read(&self.log)?;
+        log.summary.damage().iter().for_each(|line| say(line));
         let choice = SensorChoice {
             profile: self.sensor,
             competence: Some(Competence::Scanner),
@@ -64,7 +65,13 @@ impl Extract {
         std::fs::write(&self.out, text)
             .map_err(|e| format!("cannot write {}: {e}", self.out.display()))?;
         say(&in_words(found.iter().map(|(_, _, _, features)| features)));
-        Ok(ExitCode::SUCCESS)
+        Ok(match &log.summary.cut_short {
+            None => ExitCode::SUCCESS,
+            Some(reason) => super::failed(&format!(
+                "{} holds no more than what came before the log was cut short ({reason})",
+                self.out.display()
+            )),
+        })
     }
 }
 

@@ -15,8 +15,12 @@ const LINE_EVERY: Duration = Duration::from_secs(5);
 /// Time between two drawings of the bar.
 const DRAW_EVERY: Duration = Duration::from_millis(100);
 
-/// Shows progress until its sender is gone.
+/// Tells what is wrong with the log, if anything, then shows progress until its sender is gone.
 pub(super) async fn show(mut progress: watch::Receiver<ReplayProgress>, robot: String) {
+    // The log has been read when its readings are counted, or when nothing more comes.
+    let _ = progress.wait_for(|now| now.readings > 0).await;
+    let damage = progress.borrow().damage.clone();
+    damage.iter().for_each(|line| say(line));
     if std::io::stderr().is_terminal() {
         bar(&mut progress, robot).await;
     } else {

@@ -85,7 +85,7 @@ pub(super) struct Replay {
     #[arg(long, value_name = "M")]
     resolution: Option<f64>,
     /// Folder of the durable outbox; one under ./mapfold-robot-data if absent.
-    #[arg(long, value_name = "DIR", visible_alias = "state-dir")]
+    #[arg(long, value_name = "DIR")]
     outbox: Option<PathBuf>,
     /// Give up after so many seconds; never if absent.
     #[arg(long, value_name = "SECONDS")]
@@ -158,7 +158,7 @@ fn deviation(text: &str) -> Result<f64, String> {
 
 fn in_words(report: &Report) -> String {
     let Report { robot, contributions, acknowledged, known, wall_seconds, .. } = report;
-    let outcome = if report.complete {
+    let outcome = if report.trouble.is_none() {
         format!(
             "all {contributions} contributions are with the server ({acknowledged} acknowledged \
              now, {known} before)"
@@ -177,6 +177,9 @@ fn in_words(report: &Report) -> String {
         report.retries
     );
     let passed = report.passed.iter().map(|(reason, count)| format!("{count} readings {reason}"));
-    let all: Vec<String> = [outcome, cost].into_iter().chain(passed).collect();
+    let cut_short = report.cut_short.as_ref().map(|reason| {
+        format!("the log is cut short ({reason}), so what came after is missing from the map")
+    });
+    let all: Vec<String> = [outcome, cost].into_iter().chain(passed).chain(cut_short).collect();
     format!("{robot}: {}", all.join("; "))
 }

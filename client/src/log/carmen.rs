@@ -2,7 +2,7 @@
 //!
 //! [`messages`] streams line by line; [`read`] gathers a file into a [`Log`]. A line that cannot
 //! be read is counted and reported and never stops the reading; only a file from which no reading
-//! comes at all is an error.
+//! comes at all is an error. A file that breaks off gives what came before, and the summary says so.
 //!
 //! Angles: `ROBOTLASER1` tells its own. `FLASER` does not: 180 or 181 beams are 1 degree apart,
 //! 360 or 361 half a degree, other counts half a degree as MRPT assumes; the parameter

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::ReplayOptions;
 use super::producer::{Surveyed, in_words};
+use crate::log::Summary;
 use crate::sync::{UploadEnd, UploadSummary};
 
 /// The outcome of a replay.
@@ -20,10 +21,14 @@ pub struct Report {
     pub level: String,
     /// The robot's slug.
     pub robot: String,
-    /// Whether everything that was ever to be sent is acknowledged.
+    /// Whether everything that was ever to be sent is acknowledged, and the log is whole.
     pub complete: bool,
-    /// What is not as it should be, if anything.
+    /// What kept contributions from the server, if anything.
     pub trouble: Option<String>,
+    /// Lines of the log that could not be read and were passed over.
+    pub malformed_lines: u64,
+    /// What cut the log short, if anything; what came before it was played.
+    pub cut_short: Option<String>,
     /// Readings played.
     pub readings: u64,
     /// Readings that gave a contribution, in this run or an earlier one.
@@ -59,6 +64,7 @@ pub struct Report {
 impl Report {
     pub(super) fn new(
         options: &ReplayOptions,
+        log: &Summary,
         surveyed: &Surveyed,
         upload: &UploadSummary,
         took: Duration,
@@ -71,8 +77,10 @@ impl Report {
             site: options.level.site.clone(),
             level: options.level.level.clone(),
             robot: options.robot.clone(),
-            complete: upload.is_complete(),
+            complete: upload.is_complete() && log.cut_short.is_none(),
             trouble: trouble(upload),
+            malformed_lines: log.malformed,
+            cut_short: log.cut_short.clone(),
             readings: surveyed.readings,
             contributions: surveyed.placed,
             acknowledged: progress.acknowledged,
