@@ -130,7 +130,7 @@ pub(super) struct ExportCommand {
     /// Slug of the level
     #[arg(long)]
     pub(super) level: String,
-    /// The file to write; for nav2 the YAML, with `map.pgm` beside it
+    /// The file to write; for nav2 the YAML, with the image beside it: `floor.pgm` for `floor.yaml`
     #[arg(long, value_name = "FILE")]
     pub(super) out: PathBuf,
 }
@@ -139,7 +139,7 @@ pub(super) struct ExportCommand {
 pub(super) enum ExportFormat {
     /// Segments and clusters in metres
     Geojson,
-    /// `map.yaml` and `map.pgm`
+    /// A YAML and a PGM, as `map_server` reads them
     Nav2,
 }
 

@@ -5,6 +5,7 @@
 //! grey 205 of an unknown cell reads as probability 0.19608, which must stay unknown
 //! (Nav2's own saver writes the same).
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -12,9 +13,9 @@ use std::io::{self, Write};
 use mapfold_map::level::LevelMap;
 use mapfold_map::raster::{LogOdds, SensorClass, TILE_SIDE, TileIndex, TileKey};
 
-/// Name of the image, as the YAML names it.
+/// Name of the image, where nobody chose another.
 pub const IMAGE_NAME: &str = "map.pgm";
-/// Name of the description.
+/// Name of the description, where nobody chose another.
 pub const YAML_NAME: &str = "map.yaml";
 /// Most pixels of an image: 1.6 km by 1.6 km at 10 cm, and what readers still load.
 pub const PIXELS_MAX: u64 = 16_384 * 16_384;
@@ -80,16 +81,17 @@ impl<'a> Nav2Map<'a> {
         })
     }
 
-    /// The description that readers load first.
-    pub fn yaml(&self) -> String {
+    /// The description that readers load first, of the image that lies beside it as `image`.
+    pub fn yaml(&self, image: &str) -> String {
         let origin = |tiles: i32| (i64::from(tiles) * TILE_SIDE as i64) as f64 * self.resolution;
         let (x, y) = (origin(self.lower_left.x), origin(self.lower_left.y));
         let mut yaml = String::new();
         // Writing to a String cannot fail.
         let _ = write!(
             yaml,
-            "image: {IMAGE_NAME}\nmode: trinary\nresolution: {}\norigin: [{x:?}, {y:?}, 0.0]\n\
+            "image: {}\nmode: trinary\nresolution: {}\norigin: [{x:?}, {y:?}, 0.0]\n\
              negate: 0\noccupied_thresh: {OCCUPIED_THRESH}\nfree_thresh: {FREE_THRESH}\n",
+            scalar(image),
             self.resolution
         );
         yaml
@@ -136,6 +138,17 @@ impl<'a> Nav2Map<'a> {
                 }
             }
         }
+    }
+}
+
+/// A string as YAML: plain where nothing in it means more than itself, else between quotes (as in
+/// JSON, which YAML contains).
+fn scalar(text: &str) -> Cow<'_, str> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '_' | '-');
+    if text.starts_with(|c: char| c.is_ascii_alphabetic()) && text.chars().all(plain) {
+        Cow::Borrowed(text)
+    } else {
+        Cow::Owned(serde_json::Value::from(text).to_string())
     }
 }
 
@@ -219,7 +232,7 @@ mod tests {
             (SensorClass::Sonar, -1, 0, &[(0, 40)]),
         ]);
         let nav2 = Nav2Map::new(&map, 0.05).unwrap();
-        assert!(nav2.yaml().contains("origin: [-3.2, 0.0, 0.0]\n"));
+        assert!(nav2.yaml(IMAGE_NAME).contains("origin: [-3.2, 0.0, 0.0]\n"));
         let mut image = Vec::new();
         nav2.write_pgm(&mut image).unwrap();
         let pixels = image.strip_prefix(b"P5\n64 64\n255\n").unwrap();
@@ -228,6 +241,19 @@ mod tests {
         assert_eq!(pixels[63 * 64], OCCUPIED, "the first cell is the bottom left pixel");
         let known: Vec<&u8> = pixels.iter().filter(|p| **p != UNKNOWN).collect();
         assert_eq!(known.len(), 2);
+    }
+
+    #[test]
+    fn a_name_that_means_something_in_yaml_stands_between_quotes() {
+        let map = map_of(&[(SensorClass::Scanner, 0, 0, &[(0, 100)])]);
+        let nav2 = Nav2Map::new(&map, 0.05).unwrap();
+        for (name, line) in [
+            ("floor-2.pgm", "image: floor-2.pgm\n"),
+            ("2.pgm", "image: \"2.pgm\"\n"),
+            ("a: #1 \"x\".pgm", "image: \"a: #1 \\\"x\\\".pgm\"\n"),
+        ] {
+            assert!(nav2.yaml(name).starts_with(line), "{}", nav2.yaml(name));
+        }
     }
 
     #[test]

@@ -34,7 +34,7 @@ type Writer = fn(&Snapshot) -> Result<Vec<u8>, ApiError>;
         ("format" = String, Path, description = "`geojson` or `nav2`"),
     ),
     responses(
-        (status = 200, content((Object = "application/geo+json"), (Vec<u8> = "application/zip"))),
+        (status = 200, description = "The file", content((Object = "application/geo+json"), (Vec<u8> = "application/zip"))),
         (status = 404, description = "`format_not_found`"),
         (status = 409, description = "`map_empty`, `map_too_large`: there is no image of this map"),
     )
@@ -76,7 +76,7 @@ fn write_nav2(snapshot: &Snapshot) -> Result<Vec<u8>, ApiError> {
     let options = SimpleFileOptions::default().last_modified_time(zip::DateTime::default());
     let zipped = |error: zip::result::ZipError| ApiError::Internal(error.to_string());
     zip.start_file(nav2::YAML_NAME, options).map_err(zipped)?;
-    zip.write_all(nav2.yaml().as_bytes()).map_err(|error| failed(&error))?;
+    zip.write_all(nav2.yaml(nav2::IMAGE_NAME).as_bytes()).map_err(|error| failed(&error))?;
     zip.start_file(nav2::IMAGE_NAME, options).map_err(zipped)?;
     nav2.write_pgm(&mut zip).map_err(|error| failed(&error))?;
     Ok(zip.finish().map_err(zipped)?.into_inner())

@@ -74,9 +74,11 @@ fn exports_of_a_known_map_are_the_committed_files() {
     geojson::write_map(&map, &mut features).unwrap();
     nav2.write_pgm(&mut image).unwrap();
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/http/golden");
-    for (name, bytes) in
-        [("map.geojson", features), ("map.yaml", nav2.yaml().into_bytes()), ("map.pgm", image)]
-    {
+    for (name, bytes) in [
+        ("map.geojson", features),
+        ("map.yaml", nav2.yaml("map.pgm").into_bytes()),
+        ("map.pgm", image),
+    ] {
         if std::env::var_os("UPDATE").is_some() {
             std::fs::create_dir_all(&folder).unwrap();
             std::fs::write(folder.join(name), &bytes).unwrap();
@@ -127,8 +129,12 @@ async fn the_same_looks_in_any_order_give_the_same_bytes_over_http_and_on_the_co
         let yaml = exported(folder.path(), "nav2", "floor.yaml");
         let zipped = unzipped(nav2);
         assert_eq!(zipped.keys().collect::<Vec<_>>(), ["map.pgm", "map.yaml"]);
-        assert_eq!(std::fs::read(&yaml).unwrap(), zipped["map.yaml"]);
-        assert!(std::fs::read(yaml.with_file_name("map.pgm")).unwrap() == zipped["map.pgm"]);
+        let of_zip = String::from_utf8(zipped["map.yaml"].clone()).unwrap();
+        let described = of_zip.replace("image: map.pgm\n", "image: floor.pgm\n");
+        assert_ne!(described, of_zip);
+        assert_eq!(std::fs::read_to_string(&yaml).unwrap(), described);
+        assert!(std::fs::read(yaml.with_file_name("floor.pgm")).unwrap() == zipped["map.pgm"]);
+        assert!(!yaml.with_file_name("map.pgm").exists());
     }
     assert!(exports[0] == exports[1], "the order of arrival shows in an export");
 }
