@@ -1156,6 +1156,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description Whose session or token this is */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -1188,6 +1189,7 @@ export interface operations {
             };
         };
         responses: {
+            /** @description Signed in; the cookie is the session */
             201: {
                 headers: {
                     "set-cookie"?: string;
@@ -1226,6 +1228,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description Signed out */
             204: {
                 headers: {
                     [name: string]: unknown;
@@ -1252,6 +1255,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description The sites */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -1284,6 +1288,7 @@ export interface operations {
             };
         };
         responses: {
+            /** @description The new site */
             201: {
                 headers: {
                     [name: string]: unknown;
@@ -1323,6 +1328,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description The levels of the site */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -1357,6 +1363,7 @@ export interface operations {
             };
         };
         responses: {
+            /** @description The new level */
             201: {
                 headers: {
                     [name: string]: unknown;
@@ -1397,6 +1404,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description The level */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -1441,6 +1449,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description A page of the log */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -1470,7 +1479,7 @@ export interface operations {
             };
             cookie?: never;
         };
-        /** @description One contribution, or an array of up to 64. May be coded as gzip or zstd. */
+        /** @description One contribution, or an array of up to 64. May be coded as gzip or zstd. In CBOR a UUID (`id`, `frame`) is a byte string of 16 bytes, not text, and every `number` is a float of any width, never an integer; all else is as in JSON. */
         requestBody: {
             content: {
                 "application/cbor": components["schemas"]["Contribution"];
@@ -1583,6 +1592,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description The contribution and its receipt */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -1620,6 +1630,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description Events, for as long as the stream is open */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -1662,6 +1673,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description The file */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -1720,6 +1732,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description What has changed since. In CBOR UUIDs are byte strings of 16 bytes */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -1766,6 +1779,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description The tiles that have changed since */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -1814,6 +1828,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description The cells of the tile */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -1860,6 +1875,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description The picture */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -1896,6 +1912,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description The features that have changed since. In CBOR UUIDs are byte strings of 16 bytes and numbers floats */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -1937,6 +1954,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description The robots of the site */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -1971,6 +1989,7 @@ export interface operations {
             };
         };
         responses: {
+            /** @description The new robot */
             201: {
                 headers: {
                     [name: string]: unknown;
@@ -2011,6 +2030,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description The robot */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -2046,6 +2066,7 @@ export interface operations {
             };
         };
         responses: {
+            /** @description The robot as it is now */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -2081,6 +2102,7 @@ export interface operations {
             };
         };
         responses: {
+            /** @description The token, in clear this once */
             201: {
                 headers: {
                     [name: string]: unknown;
@@ -2109,6 +2131,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description It runs */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -2137,6 +2160,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description The figures, as Prometheus reads them */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -2165,6 +2189,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
+            /** @description It takes requests */
             200: {
                 headers: {
                     [name: string]: unknown;

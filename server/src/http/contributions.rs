@@ -60,7 +60,9 @@ struct Judged {
     params(("site" = String, Path), ("level" = String, Path)),
     request_body(
         content((Contribution = "application/json"), (Contribution = "application/cbor")),
-        description = "One contribution, or an array of up to 64. May be coded as gzip or zstd.",
+        description = "One contribution, or an array of up to 64. May be coded as gzip or zstd. \
+            In CBOR a UUID (`id`, `frame`) is a byte string of 16 bytes, not text, and every \
+            `number` is a float of any width, never an integer; all else is as in JSON.",
     ),
     responses(
         (status = 201, body = Receipt, description = "On disk. For an array: an array of \
@@ -212,7 +214,7 @@ pub(super) struct LogQuery {
 #[utoipa::path(
     get, path = route::CONTRIBUTIONS, operation_id = "read_log", tag = "contributions",
     params(("site" = String, Path), ("level" = String, Path), LogQuery),
-    responses((status = 200, body = ContributionPage))
+    responses((status = 200, body = ContributionPage, description = "A page of the log"))
 )]
 pub(super) async fn list(
     State(app): State<App>,
@@ -237,7 +239,7 @@ pub(super) async fn list(
 #[utoipa::path(
     get, path = route::CONTRIBUTION, operation_id = "read_contribution", tag = "contributions",
     params(("site" = String, Path), ("level" = String, Path), ("id" = Uuid, Path)),
-    responses((status = 200, body = ContributionRecord))
+    responses((status = 200, body = ContributionRecord, description = "The contribution and its receipt"))
 )]
 pub(super) async fn describe(
     State(app): State<App>,

@@ -49,7 +49,7 @@ pub(super) struct EventQuery {
         ("Last-Event-ID" = Option<i64>, Header, description = "As browsers send it"),
     ),
     responses(
-        (status = 200, content_type = "text/event-stream", body = LevelEvent),
+        (status = 200, content_type = "text/event-stream", body = LevelEvent, description = "Events, for as long as the stream is open"),
         (status = 429, description = "`streams_exhausted`; see `Retry-After`"),
     )
 )]

@@ -26,7 +26,7 @@ fn text(media_type: &'static str, body: String) -> Response {
 /// Whether the process runs.
 #[utoipa::path(
     get, path = "/livez", operation_id = "livez", tag = "health", security(()),
-    responses((status = 200, content_type = "text/plain", body = String))
+    responses((status = 200, content_type = "text/plain", body = String, description = "It runs"))
 )]
 pub(super) async fn live() -> Response {
     text(TEXT, "alive\n".to_owned())
@@ -36,7 +36,7 @@ pub(super) async fn live() -> Response {
 #[utoipa::path(
     get, path = "/readyz", operation_id = "readyz", tag = "health", security(()),
     responses(
-        (status = 200, content_type = "text/plain", body = String),
+        (status = 200, content_type = "text/plain", body = String, description = "It takes requests"),
         (status = 503, description = "`closing`, `unavailable`"),
     )
 )]
@@ -57,7 +57,7 @@ pub(super) async fn ready(State(app): State<App>) -> Result<Response, ApiError> 
 /// Figures for Prometheus.
 #[utoipa::path(
     get, path = "/metrics", operation_id = "metrics", tag = "health", security(()),
-    responses((status = 200, content_type = "text/plain", body = String))
+    responses((status = 200, content_type = "text/plain", body = String, description = "The figures, as Prometheus reads them"))
 )]
 pub(super) async fn metrics(State(app): State<App>) -> Response {
     let streams = app.parts.limits.streams_max - app.streams.available_permits();

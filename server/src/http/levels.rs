@@ -20,7 +20,7 @@ const RESOLUTION_M: f64 = 0.05;
 #[utoipa::path(
     get, path = route::LEVELS, operation_id = "list_levels", tag = "levels",
     params(("site" = String, Path)),
-    responses((status = 200, body = Vec<LevelDescription>))
+    responses((status = 200, body = Vec<LevelDescription>, description = "The levels of the site"))
 )]
 pub(super) async fn list(
     State(app): State<App>,
@@ -40,7 +40,7 @@ pub(super) async fn list(
 #[utoipa::path(
     post, path = route::LEVELS, operation_id = "create_level", tag = "levels",
     params(("site" = String, Path)), request_body = NewLevel,
-    responses((status = 201, body = LevelDescription), (status = 409, description = "`level_exists`"))
+    responses((status = 201, body = LevelDescription, description = "The new level"), (status = 409, description = "`level_exists`"))
 )]
 pub(super) async fn create(
     State(app): State<App>,
@@ -67,7 +67,7 @@ pub(super) async fn create(
 #[utoipa::path(
     get, path = route::LEVEL, operation_id = "describe_level", tag = "levels",
     params(("site" = String, Path), ("level" = String, Path)),
-    responses((status = 200, body = LevelDescription))
+    responses((status = 200, body = LevelDescription, description = "The level"))
 )]
 pub(super) async fn describe(level: LevelFor<Read>, reader: Reader) -> Result<Response, ApiError> {
     reader.small(&level.level.describe())

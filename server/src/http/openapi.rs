@@ -19,7 +19,9 @@ const PREFACE: &str = "Mapfold keeps one shared map for a mixed fleet.
 
 Lengths are metres, angles radians, instants RFC 3339 in UTC. Reads answer JSON or CBOR (the same \
 types) by `Accept`, bear a strong `ETag`, take `If-None-Match`, and name the revision they show in \
-`Mapfold-Revision`. Bodies are JSON or CBOR and may be coded as gzip or zstd. Every refusal is an \
+`Mapfold-Revision`. Bodies are JSON or CBOR and may be coded as gzip or zstd. In CBOR a UUID is a \
+byte string of 16 bytes, not text, and what the schema calls a `number` is a float of any width, \
+never an integer; all else is as in JSON. Every refusal is an \
 RFC 9457 problem (`application/problem+json`) with a stable `code`; where it is `retryable`, \
 `Retry-After` says when to try again. What a token does not reach is not found.";
 

@@ -35,7 +35,7 @@ pub(super) struct PatchQuery {
     get, path = route::PATCHES, operation_id = "read_patch", tag = "map",
     params(("site" = String, Path), ("level" = String, Path), PatchQuery),
     responses(
-        (status = 200, content((Patch = "application/json"), (Patch = "application/cbor"))),
+        (status = 200, description = "What has changed since. In CBOR UUIDs are byte strings of 16 bytes", content((Patch = "application/json"), (Patch = "application/cbor"))),
         (status = 410, description = "`cursor_expired`: `since` is ahead of the log; read from 0"),
     )
 )]

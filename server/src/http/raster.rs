@@ -20,7 +20,7 @@ const BINARY: &str = "application/octet-stream";
     get, path = route::RASTER, operation_id = "read_raster_changes", tag = "map",
     params(("site" = String, Path), ("level" = String, Path), SinceInBox),
     responses(
-        (status = 200, content(
+        (status = 200, description = "The tiles that have changed since", content(
             (RasterChanges = "application/json"),
             (RasterChanges = "application/cbor"),
         )),
@@ -63,7 +63,7 @@ pub(super) struct TileQuery {
         TileQuery,
     ),
     responses(
-        (status = 200, content_type = "application/octet-stream", body = [u8]),
+        (status = 200, content_type = "application/octet-stream", body = [u8], description = "The cells of the tile"),
         (status = 404, description = "`tile_not_found`: no evidence there"),
     )
 )]

@@ -17,7 +17,7 @@ use crate::auth::{self, Grant};
 #[utoipa::path(
     get, path = route::ROBOTS, operation_id = "list_robots", tag = "robots",
     params(("site" = String, Path)),
-    responses((status = 200, body = Vec<RobotDescription>))
+    responses((status = 200, body = Vec<RobotDescription>, description = "The robots of the site"))
 )]
 pub(super) async fn list(
     State(app): State<App>,
@@ -31,7 +31,7 @@ pub(super) async fn list(
 #[utoipa::path(
     post, path = route::ROBOTS, operation_id = "enrol_robot", tag = "robots",
     params(("site" = String, Path)), request_body = NewRobot,
-    responses((status = 201, body = RobotDescription), (status = 409, description = "`robot_exists`"))
+    responses((status = 201, body = RobotDescription, description = "The new robot"), (status = 409, description = "`robot_exists`"))
 )]
 pub(super) async fn enrol(
     State(app): State<App>,
@@ -48,7 +48,7 @@ pub(super) async fn enrol(
 #[utoipa::path(
     get, path = route::ROBOT, operation_id = "describe_robot", tag = "robots",
     params(("site" = String, Path), ("robot" = String, Path)),
-    responses((status = 200, body = RobotDescription))
+    responses((status = 200, body = RobotDescription, description = "The robot"))
 )]
 pub(super) async fn describe(
     State(app): State<App>,
@@ -65,7 +65,7 @@ pub(super) async fn describe(
 #[utoipa::path(
     patch, path = route::ROBOT, operation_id = "update_robot", tag = "robots",
     params(("site" = String, Path), ("robot" = String, Path)), request_body = RobotUpdate,
-    responses((status = 200, body = RobotDescription))
+    responses((status = 200, body = RobotDescription, description = "The robot as it is now"))
 )]
 pub(super) async fn update(
     State(app): State<App>,
@@ -101,7 +101,7 @@ fn may_update(
 #[utoipa::path(
     post, path = route::ROBOT_TOKENS, operation_id = "issue_robot_token", tag = "robots",
     params(("site" = String, Path), ("robot" = String, Path)), request_body = NewToken,
-    responses((status = 201, body = IssuedToken))
+    responses((status = 201, body = IssuedToken, description = "The token, in clear this once"))
 )]
 pub(super) async fn issue_token(
     State(app): State<App>,

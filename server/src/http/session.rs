@@ -39,7 +39,7 @@ fn set_cookie(response: &mut Response, value: &str, age_s: i64) {
     post, path = route::SESSION, operation_id = "sign_in", tag = "session", security(()),
     request_body = NewSession,
     responses(
-        (status = 201, body = SessionDescription, headers(("set-cookie" = String))),
+        (status = 201, body = SessionDescription, description = "Signed in; the cookie is the session", headers(("set-cookie" = String))),
         (status = 401, description = "`invalid_token`"),
     )
 )]
@@ -66,7 +66,7 @@ pub(super) async fn sign_in(
 /// Who is signed in, or whose token this is.
 #[utoipa::path(
     get, path = route::SESSION, operation_id = "describe_session", tag = "session",
-    responses((status = 200, body = SessionDescription))
+    responses((status = 200, body = SessionDescription, description = "Whose session or token this is"))
 )]
 pub(super) async fn describe(caller: Caller, reader: Reader) -> Result<Response, ApiError> {
     reader.small(&described(&caller.0))
@@ -75,7 +75,7 @@ pub(super) async fn describe(caller: Caller, reader: Reader) -> Result<Response,
 /// Signs out: the session ends here and everywhere. A token that is not a session's stays.
 #[utoipa::path(
     delete, path = route::SESSION, operation_id = "sign_out", tag = "session",
-    responses((status = 204))
+    responses((status = 204, description = "Signed out"))
 )]
 pub(super) async fn sign_out(
     State(app): State<App>,

@@ -15,7 +15,7 @@ use super::state::App;
 /// The sites that the token reaches, by slug.
 #[utoipa::path(
     get, path = route::SITES, operation_id = "list_sites", tag = "sites",
-    responses((status = 200, body = Vec<SiteDescription>))
+    responses((status = 200, body = Vec<SiteDescription>, description = "The sites"))
 )]
 pub(super) async fn list(
     State(app): State<App>,
@@ -31,7 +31,7 @@ pub(super) async fn list(
 #[utoipa::path(
     post, path = route::SITES, operation_id = "create_site", tag = "sites",
     request_body = NewSite,
-    responses((status = 201, body = SiteDescription), (status = 409, description = "`site_exists`"))
+    responses((status = 201, body = SiteDescription, description = "The new site"), (status = 409, description = "`site_exists`"))
 )]
 pub(super) async fn create(
     State(app): State<App>,

@@ -82,7 +82,7 @@ impl From<LayerName> for Layer {
         ("z" = u8, Path, maximum = 8), ("row" = i32, Path), ("col" = i32, Path),
         PictureQuery,
     ),
-    responses((status = 200, content_type = "image/png", body = [u8]))
+    responses((status = 200, content_type = "image/png", body = [u8], description = "The picture"))
 )]
 pub(super) async fn read(
     State(app): State<App>,

@@ -20,7 +20,7 @@ use super::query::{QueryOf, SinceInBox};
     get, path = route::VECTOR, operation_id = "read_vector", tag = "map",
     params(("site" = String, Path), ("level" = String, Path), SinceInBox),
     responses(
-        (status = 200, content(
+        (status = 200, description = "The features that have changed since. In CBOR UUIDs are byte strings of 16 bytes and numbers floats", content(
             (VectorPatch = "application/json"),
             (VectorPatch = "application/cbor"),
             (Object = "application/geo+json"),

@@ -66,11 +66,40 @@ fn the_description_is_openapi_3_1_and_gives_every_operation_its_problems() {
             let schema = operation.pointer(schema).unwrap();
             assert_eq!(schema, "#/components/schemas/Problem", "{method} {path}");
             assert!(operation["summary"].is_string(), "{method} {path} has no words");
+            for (status, response) in operation["responses"].as_object().unwrap() {
+                let words = response["description"].as_str().unwrap_or_default();
+                assert!(!words.is_empty(), "{method} {path}: {status} has no description");
+            }
         }
     }
+    assert!(ids.len() >= 24, "{ids:?}");
     let schemas = json["components"]["schemas"].as_object().unwrap();
     for name in ["Contribution", "Receipt", "UploadAnswer", "VectorPatch", "Patch", "Problem"] {
         assert!(schemas.contains_key(name), "{name}");
+    }
+}
+
+/// All that `value` refers to, at any depth.
+fn references<'a>(value: &'a serde_json::Value, found: &mut BTreeSet<&'a str>) {
+    match value {
+        serde_json::Value::Object(fields) => {
+            found.extend(fields.get("$ref").and_then(|reference| reference.as_str()));
+            fields.values().for_each(|field| references(field, found));
+        }
+        serde_json::Value::Array(items) => items.iter().for_each(|item| references(item, found)),
+        _ => {}
+    }
+}
+
+#[test]
+fn all_that_the_description_refers_to_is_in_it() {
+    let json = serde_json::to_value(mapfold_server::http::openapi()).unwrap();
+    let mut found = BTreeSet::new();
+    references(&json, &mut found);
+    assert!(found.len() > 20, "{found:?}");
+    for reference in found {
+        let target = reference.strip_prefix('#').and_then(|pointer| json.pointer(pointer));
+        assert!(target.is_some(), "{reference} leads nowhere");
     }
 }
 
