@@ -118,7 +118,7 @@ fn cut_short(folder: &Path) -> PathBuf {
 
 /// A log that ends as it should, with seven lines in it that cannot be read.
 fn with_broken_lines(folder: &Path) -> PathBuf {
-    let broken = (0..7).map(|n| format!("FLASER {} 1\n", 90 + n)).collect::<String>();
+    let broken = "FLASER 90 1\n".repeat(7);
     let file = folder.join("broken.log");
     std::fs::write(&file, format!("{broken}{}", text(40))).unwrap();
     file

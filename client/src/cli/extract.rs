@@ -31,7 +31,9 @@ pub(super) struct Extract {
 impl Extract {
     pub(super) fn run(self) -> Result<ExitCode, Box<dyn std::error::Error>> {
         let log = carmen::read(&self.log)?;
-        log.summary.damage().iter().for_each(|line| say(line));
+        for line in log.summary.damage() {
+            say(&line);
+        }
         let choice = SensorChoice {
             profile: self.sensor,
             competence: Some(Competence::Scanner),

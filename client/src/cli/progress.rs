@@ -20,7 +20,9 @@ pub(super) async fn show(mut progress: watch::Receiver<ReplayProgress>, robot: S
     // The log has been read when its readings are counted, or when nothing more comes.
     let _ = progress.wait_for(|now| now.readings > 0).await;
     let damage = progress.borrow().damage.clone();
-    damage.iter().for_each(|line| say(line));
+    for line in &damage {
+        say(line);
+    }
     if std::io::stderr().is_terminal() {
         bar(&mut progress, robot).await;
     } else {

@@ -84,9 +84,15 @@ fn references<'a>(value: &'a serde_json::Value, found: &mut BTreeSet<&'a str>) {
     match value {
         serde_json::Value::Object(fields) => {
             found.extend(fields.get("$ref").and_then(|reference| reference.as_str()));
-            fields.values().for_each(|field| references(field, found));
+            for field in fields.values() {
+                references(field, found);
+            }
         }
-        serde_json::Value::Array(items) => items.iter().for_each(|item| references(item, found)),
+        serde_json::Value::Array(items) => {
+            for item in items {
+                references(item, found);
+            }
+        }
         _ => {}
     }
 }
