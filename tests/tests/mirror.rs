@@ -13,7 +13,7 @@ use mapfold_tests::level::{Level, Replica};
 use mapfold_tests::server::Server;
 
 /// Scans that are played: enough for walls to be founded, merged, opened and dropped.
-const SCANS: usize = 300;
+const SCANS: usize = 600;
 
 /// Things a page, far fewer than there are: every mirror must go through many pages.
 const PAGE: usize = 100;
@@ -39,7 +39,7 @@ async fn a_mirror_that_follows_patches_equals_a_full_fetch() -> Result<(), Error
                 if replica.follow(&level, PAGE, accept).await.is_ok() {
                     steps.insert(replica.revision);
                 }
-                tokio::time::sleep(std::time::Duration::from_millis(100)).await;
+                tokio::time::sleep(std::time::Duration::from_millis(10)).await;
             }
             (replica, steps.len())
         }
