@@ -7,9 +7,9 @@ use crate::plane::Piece;
 /// A return counts as explained if something of the map lies this near.
 pub const NEAR_M: f64 = 0.10;
 
-/// A beam counts as running through a wall if it ends farther than this behind it, square to the
-/// wall: a beam that grazes a wall goes on for longer along itself when the wall is known to a
-/// centimetre, so that is counted beside it.
+/// A beam counts as running through a wall if it goes on behind it for longer than this, along
+/// itself, and that wall does not explain where it ended: a beam that grazes a wall goes on for
+/// longer when the wall is known to a centimetre, and ends at it all the same.
 pub const THROUGH_M: f64 = 0.20;
 
 /// Counts over the returns of a log. Beams without return say nothing here and are not counted.
@@ -20,10 +20,10 @@ pub struct Coverage {
     /// Of them, those whose end lies within [`NEAR_M`] of a segment, a cluster's hull or an
     /// occupied cell.
     pub explained: u64,
-    /// Of them, those that cross a published segment and end more than [`THROUGH_M`] behind it.
+    /// Of them, those that cross a published segment, go on behind it for more than [`THROUGH_M`]
+    /// and end farther than [`NEAR_M`] from it.
     pub through: u64,
-    /// Of them, those that cross a published segment and go on along themselves for more than
-    /// [`THROUGH_M`].
+    /// The same, wherever they end.
     pub through_along: u64,
 }
 
@@ -38,7 +38,7 @@ impl Coverage {
         self.through as f64 / self.returns.max(1) as f64
     }
 
-    /// The same, with what is behind measured along the beams.
+    /// The same, beams that end at the segment included.
     pub fn through_along_share(&self) -> f64 {
         self.through_along as f64 / self.returns.max(1) as f64
     }
@@ -52,9 +52,9 @@ pub fn measure(floor: &Floor, log: &Log) -> Coverage {
             let beam = Piece { a: scan.origin, b: end };
             coverage.returns += 1;
             coverage.explained += u64::from(floor.is_near(end, NEAR_M));
-            let behind = floor.behind(&beam);
-            coverage.through += u64::from(behind.across_m > THROUGH_M);
-            coverage.through_along += u64::from(behind.along_m > THROUGH_M);
+            let behind = floor.behind(&beam, NEAR_M);
+            coverage.through += u64::from(behind.unexplained_m > THROUGH_M);
+            coverage.through_along += u64::from(behind.any_m > THROUGH_M);
         }
     }
     coverage

@@ -109,8 +109,9 @@ impl Floor {
         self.tiles.get(&tile).map_or(0, |sums| sums[offset as usize])
     }
 
-    /// How far a beam goes on behind the pieces that it crosses: the farthest of them.
-    pub fn behind(&self, beam: &Piece) -> Behind {
+    /// How far a beam goes on behind the pieces that it crosses: the farthest of them. Pieces that
+    /// lie within `near_m` of the beam's end explain it.
+    pub fn behind(&self, beam: &Piece, near_m: f64) -> Behind {
         let length = beam.length();
         let mut behind = Behind::default();
         // Half a bin a step, and every bin reaches half a bin farther than its square: no piece
@@ -125,8 +126,11 @@ impl Floor {
             for index in self.piece_bins.at(at) {
                 let piece = &self.pieces[index];
                 if let Some(share) = beam.crossing(piece) {
-                    behind.along_m = behind.along_m.max((1.0 - share) * length);
-                    behind.across_m = behind.across_m.max(piece.distance_from_line(beam.b));
+                    let along_m = (1.0 - share) * length;
+                    behind.any_m = behind.any_m.max(along_m);
+                    if piece.distance(beam.b) > near_m {
+                        behind.unexplained_m = behind.unexplained_m.max(along_m);
+                    }
                 }
             }
         }
@@ -134,14 +138,14 @@ impl Floor {
     }
 }
 
-/// How far a beam goes on behind walls.
+/// How far a beam goes on behind walls, along itself, metres.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Behind {
-    /// Along the beam, metres. A beam that grazes a wall runs far along it for an error of
-    /// a few centimetres across.
-    pub along_m: f64,
-    /// Square to the wall, metres.
-    pub across_m: f64,
+    /// Behind any wall. A beam that grazes a wall runs far along it for an error of a few
+    /// centimetres across.
+    pub any_m: f64,
+    /// Behind walls that do not explain where it ended.
+    pub unexplained_m: f64,
 }
 
 /// The solid parts of a segment as pieces: `from_m` and `to_m` run from the foot point of the
@@ -251,13 +255,15 @@ mod tests {
     fn a_beam_runs_through_a_wall_only_if_it_goes_on_behind_it() {
         let floor = Floor::new(&[wall(30.0)], &[], &[], 0.05, 0.1);
         let beam = |top: f64| Piece { a: Point::new(29.0, -20.0), b: Point::new(29.0, top) };
-        assert!((floor.behind(&beam(2.3)).across_m - 0.3).abs() < 1e-9);
-        assert!((floor.behind(&beam(2.3)).along_m - 0.3).abs() < 1e-9);
-        assert_eq!(floor.behind(&beam(1.9)), Behind::default());
+        let near = 0.1;
+        assert!((floor.behind(&beam(2.3), near).unexplained_m - 0.3).abs() < 1e-9);
+        assert!((floor.behind(&beam(2.3), near).any_m - 0.3).abs() < 1e-9);
+        assert_eq!(floor.behind(&beam(1.9), near), Behind::default());
         let past = Piece { a: Point::new(31.0, 0.0), b: Point::new(31.0, 9.0) };
-        assert_eq!(floor.behind(&past), Behind::default());
-        let grazing = Piece { a: Point::new(26.0, 1.9), b: Point::new(29.0, 2.1) };
-        let behind = floor.behind(&grazing);
-        assert!((behind.across_m - 0.1).abs() < 1e-9 && behind.along_m > 1.5);
+        assert_eq!(floor.behind(&past, near), Behind::default());
+        let grazing = |top| Piece { a: Point::new(26.0, 1.9), b: Point::new(29.0, top) };
+        let behind = floor.behind(&grazing(2.09), near);
+        assert!(behind.any_m > 1.0 && behind.unexplained_m < 1e-9);
+        assert!(floor.behind(&grazing(2.11), near).unexplained_m > 1.0);
     }
 }

@@ -68,12 +68,6 @@ impl Piece {
         point.distance(Point::new(self.a.x + share * along.x, self.a.y + share * along.y))
     }
 
-    /// Distance of a point from the line through this piece, in both directions endless.
-    pub fn distance_from_line(&self, point: Point) -> f64 {
-        let along = self.a.to(self.b);
-        along.cross(self.a.to(point)).abs() / along.dot(along).sqrt()
-    }
-
     /// Where this piece crosses `other`: the share of its own length from `a`, if it does.
     /// Pieces that lie along each other do not cross.
     pub fn crossing(&self, other: &Self) -> Option<f64> {
