@@ -6,6 +6,7 @@
 //! against free space in the grid (`seen_through`) and better walls (`walls`) -> published
 //! ([`Segment`]). Clusters go the same way, shorter (`things`).
 
+mod by_tile;
 mod cluster;
 mod config;
 mod fusion;
@@ -23,4 +24,3 @@ pub(crate) use seen_through::Evidence;
 pub use segment::{EndKind, Facing, ObservedEnd, ObservedSegment, Segment, SolidInterval};
 pub(crate) use things::Things;
 pub(crate) use walls::Walls;
-pub use walls::solid_length;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::Matrix2;
 
+use super::by_tile::ByTile;
 use super::leaders::{Groupable, Leaders};
 use super::seen_through::{Evidence, all_free};
 use super::{Cluster, ObservedCluster, VectorConfig};
@@ -82,7 +83,7 @@ pub(crate) struct Things {
     sights: Leaders<Sight>,
     /// Every cluster, published or not.
     clusters: BTreeMap<FeatureId, Arc<Cluster>>,
-    by_tile: BTreeMap<TileIndex, BTreeSet<FeatureId>>,
+    by_tile: ByTile,
 }
 
 impl Things {
@@ -111,7 +112,7 @@ impl Things {
             self.fuse(*id, grid.resolution());
         }
         for tile in touched {
-            unpublished.extend(self.by_tile.get(tile).into_iter().flatten());
+            unpublished.extend(self.by_tile.of(*tile));
         }
         let mut changed = BTreeSet::new();
         for id in unpublished {
@@ -134,20 +135,11 @@ impl Things {
     /// Makes the cluster of a group anew, or ends it with its group.
     fn fuse(&mut self, id: FeatureId, resolution: f64) {
         if let Some(old) = self.clusters.remove(&id) {
-            for tile in tiles_of(&old, resolution) {
-                if let Some(ids) = self.by_tile.get_mut(&tile) {
-                    ids.remove(&id);
-                    if ids.is_empty() {
-                        self.by_tile.remove(&tile);
-                    }
-                }
-            }
+            self.by_tile.remove(id, &tiles_of(&old, resolution));
         }
         let Some(group) = self.sights.group(id) else { return };
         if let Some(cluster) = fuse_group(group) {
-            for tile in tiles_of(&cluster, resolution) {
-                self.by_tile.entry(tile).or_default().insert(id);
-            }
+            self.by_tile.insert(id, &tiles_of(&cluster, resolution));
             self.clusters.insert(id, Arc::new(cluster));
         }
     }

@@ -3,12 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use super::by_tile::ByTile;
 use super::leaders::{Leaders, Rank, SquareIndex};
 use super::seen_through::{Evidence, seen_through, tiles_along};
 use super::sighting::Sighting;
 use super::wall::Wall;
 use super::{EndKind, Segment, SolidInterval, VectorConfig};
-use crate::geometry::{Interval, Point, subtract_intervals};
+use crate::geometry::{Point, subtract_intervals};
 use crate::level::{Contribution, FeatureId};
 use crate::raster::TileIndex;
 
@@ -26,7 +27,7 @@ pub(crate) struct Walls {
     sightings: Leaders<Sighting>,
     placed: BTreeMap<FeatureId, Placed>,
     places: SquareIndex,
-    by_tile: BTreeMap<TileIndex, BTreeSet<FeatureId>>,
+    by_tile: ByTile,
 }
 
 impl Walls {
@@ -64,8 +65,8 @@ impl Walls {
             self.remake(id, grid.resolution(), config, &mut unpublished, published, &mut changed);
         }
         for tile in touched {
-            for id in self.by_tile.get(tile).into_iter().flatten() {
-                if let Some(placed) = self.placed.get(id) {
+            for id in self.by_tile.of(*tile) {
+                if let Some(placed) = self.placed.get(&id) {
                     unpublished.insert(placed.rank);
                 }
             }
@@ -89,14 +90,7 @@ impl Walls {
     ) {
         if let Some(old) = self.placed.remove(&id) {
             self.places.remove(id, reach(&old.wall));
-            for tile in &old.tiles {
-                if let Some(walls) = self.by_tile.get_mut(tile) {
-                    walls.remove(&id);
-                    if walls.is_empty() {
-                        self.by_tile.remove(tile);
-                    }
-                }
-            }
+            self.by_tile.remove(id, &old.tiles);
             unpublished.remove(&old.rank);
             self.unpublish_near(&old.wall, unpublished);
         }
@@ -108,9 +102,7 @@ impl Walls {
             Some((wall, rank)) => {
                 let tiles = tiles_along(&wall, resolution);
                 self.places.insert(id, reach(&wall));
-                for tile in &tiles {
-                    self.by_tile.entry(*tile).or_default().insert(id);
-                }
+                self.by_tile.insert(id, &tiles);
                 self.unpublish_near(&wall, unpublished);
                 self.placed.insert(id, Placed { wall, rank, tiles });
                 unpublished.insert(rank);
@@ -223,9 +215,4 @@ fn reach(wall: &Wall) -> (Point, Point) {
     let (low, high) = wall.extent();
     let margin = Point::new(MARGIN, MARGIN);
     (low - margin, high + margin)
-}
-
-/// Total length of solid wall, metres.
-pub fn solid_length(segments: &BTreeMap<FeatureId, Arc<Segment>>) -> f64 {
-    segments.values().flat_map(|s| &s.solid).map(|s| Interval::length(&s.span) as f64 * 1e-3).sum()
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use mapfold_map::geometry::{Covariance, Point, Pose, UncertainPose};
 use mapfold_map::level::{Contribution, Level, LevelConfig, Provenance};
 use mapfold_map::raster::{Cell, EvidencePatch, SensorClass, TILE_CELLS, TilePatch};
-use mapfold_map::vector::{ObservedEnd, Segment, solid_length};
+use mapfold_map::vector::{ObservedEnd, Segment};
 
 use crate::world::{Chance, NOISE, Noise, id, looks, observe};
 
@@ -162,7 +162,7 @@ fn free_space_behind_a_thin_partition_is_that_of_its_other_face() {
 
 /// Total length of what is published, millimetres.
 fn solid(level: &Level) -> i64 {
-    (solid_length(&level.map().segments) * 1e3).round() as i64
+    level.map().segments.values().flat_map(|s| &s.solid).map(|i| i.span.length()).sum()
 }
 
 #[test]
