@@ -59,6 +59,7 @@ fn segment(segment: &ObservedSegment, placed: &PlacedFeatures<'_>) -> Value {
             "alpha_rad": level.line.alpha(),
             "covariance": level.covariance.rows(),
             "points": segment.points,
+            "seen_through_m": segment.seen_through.iter().map(|i| [i.from_m(), i.to_m()]).collect::<Vec<_>>(),
             "facing": match segment.facing {
                 Facing::Origin => "origin",
                 Facing::Away => "away",

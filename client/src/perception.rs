@@ -4,7 +4,8 @@
 //! [`points`] gives positions with covariance; [`breakpoints`] groups beams that may lie on one
 //! surface; [`split`] proposes lines by Iterative End Point Fit and confirms them by least
 //! squares; [`fit`] is the weighted total least squares behind it; [`ends`] says where and what
-//! the ends of a wall are; [`clusters`] gathers what no line explains.
+//! the ends of a wall are; [`seen_through`] says where beams went through its line beside it;
+//! [`clusters`] gathers what no line explains.
 //!
 //! Knows neither the robot's pose nor any map: results are in the robot frame and carry the
 //! sensor's uncertainty only.
@@ -15,6 +16,7 @@ pub mod ends;
 pub mod fit;
 pub mod plausibility;
 pub mod points;
+pub mod seen_through;
 mod segment;
 pub mod split;
 
@@ -38,6 +40,8 @@ pub struct Config {
     pub fit: fit::FitConfig,
     /// What the ends of a wall are.
     pub ends: ends::EndsConfig,
+    /// When a beam went through a wall's line.
+    pub seen_through: seen_through::SeenThroughConfig,
     /// What makes a cluster.
     pub clusters: clusters::ClusterConfig,
 }
@@ -52,6 +56,7 @@ impl Config {
             split: split::SplitConfig::default(),
             fit: fit::FitConfig::for_scanner(profile),
             ends: ends::EndsConfig::default(),
+            seen_through: seen_through::SeenThroughConfig::default(),
             clusters: clusters::ClusterConfig::for_scanner(profile),
         }
     }
@@ -107,12 +112,13 @@ pub fn extract_plausible(scan: &Scan, states: &[BeamState], config: &Config) -> 
         })
         .collect();
     let mut features = Features::default();
+    let sweep = seen_through::Sweep { points: &points, ring, increment: scan.geometry.increment };
     for (line, ended) in lines.iter().zip(segments) {
         let Some(ended) = ended else { continue };
         for &point in &line.members {
             beams[points[point].beam] = BeamUse::Segment(features.segments.len() as u32);
         }
-        features.segments.push(segment::in_robot_frame(line, &ended, scan));
+        features.segments.push(segment::in_robot_frame(line, &ended, &sweep, scan, config));
     }
     for cluster in clusters {
         for &point in &cluster.members {

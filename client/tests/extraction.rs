@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use mapfold_client::perception::{self, BeamUse, Config, Features};
 use mapfold_client::sensor::{Scan, ScannerProfile, preset};
-use mapfold_map::geometry::{Pose, UncertainLine, difference, tangent, unit_normal};
+use mapfold_map::geometry::{Interval, Pose, UncertainLine, difference, tangent, unit_normal};
 use mapfold_map::vector::{EndKind, Facing, ObservedSegment};
 use nalgebra::Vector2;
 use room::{Chance, Room};
@@ -117,6 +117,11 @@ fn same_but_turned(a: &Features, b: &Features, turn: f64) {
         assert!(off.abs() < 1e-9);
         assert!((a.from - b.from).abs() < 1e-9 && (a.to - b.to).abs() < 1e-9);
         assert_eq!((a.facing, a.points), (b.facing, b.points));
+        assert_eq!(a.seen_through.len(), b.seen_through.len());
+        for (a, b) in a.seen_through.iter().zip(&b.seen_through) {
+            // The last bit may tip a millimetre.
+            assert!((a.from - b.from).abs() <= 1 && (a.to - b.to).abs() <= 1);
+        }
         for (a, b) in a.ends.iter().zip(b.ends) {
             assert_eq!(a.kind, b.kind);
             assert!((a.sd - b.sd).abs() < 1e-9);
@@ -148,6 +153,14 @@ fn moving_the_sensor_on_the_robot_moves_the_answer() {
         let ends = |s: &ObservedSegment| [s.line.line.at(s.from), s.line.line.at(s.to)];
         for p in ends(a).map(|p| mount.act(&p)) {
             assert!(ends(b).iter().any(|q| (p - q).norm() < 1e-9));
+        }
+        let through = |s: &ObservedSegment| -> Vec<_> {
+            let marks = s.seen_through.iter().flat_map(|i| [i.from_m(), i.to_m()]);
+            marks.map(|t| s.line.line.at(t)).collect()
+        };
+        assert_eq!(through(a).len(), through(b).len());
+        for p in through(a).iter().map(|p| mount.act(p)) {
+            assert!(through(b).iter().any(|q| (p - q).norm() < 2e-3));
         }
         // The sensor sees the wall from its own side, wherever the robot's centre is.
         let sensor_side = b.line.line.across(&mount.position()) < 0.0;
@@ -237,8 +250,17 @@ fn an_open_door_stays_open_and_its_jambs_are_jumps() {
         );
         gap += (near[1].from - near[0].to) / 200.0;
         variance += (near[0].ends[1].sd.powi(2) + near[1].ends[0].sd.powi(2)) / 200.0;
+        // Each piece says that the door beside it was seen through, from jamb to jamb.
+        let door = |from: f64, to: f64| {
+            move |i: &Interval| (i.from_m() - from).abs() < 0.01 && (i.to_m() - to).abs() < 0.03
+        };
+        assert!(near[0].seen_through.iter().any(door(near[0].to, near[1].from)), "{near:#?}");
+        let [through] = near[1].seen_through.as_slice() else { panic!("{near:#?}") };
+        assert!((through.to_m() - near[1].from).abs() < 0.01, "{near:#?}");
+        assert!((through.from_m() - near[0].to).abs() < 0.03, "{near:#?}");
         let behind =
             found.segments.iter().find(|s| s.line.line.rho() > 4.0).expect("the wall behind");
+        assert!(behind.seen_through.is_empty());
         assert_eq!(behind.ends.map(|e| e.kind), [EndKind::Occluded; 2]);
     }
     // Half a beam's spacing is added at each end: the door is as wide as it is, on average.

@@ -38,6 +38,7 @@
 //!         facing: Facing::Origin,
 //!         ends: [ObservedEnd { kind: EndKind::Occluded, sd: 0.02 }; 2],
 //!         points: 60,
+//!         seen_through: vec![],
 //!     }],
 //!     clusters: vec![],
 //!     evidence: vec![],

@@ -53,6 +53,7 @@ pub fn valid(id: Uuid, robot: &str, target: &Target) -> v1::Contribution {
             facing: v1::Facing::Origin,
             ends: [end(v1::EndKind::Corner), end(v1::EndKind::Occluded)],
             points: 40,
+            seen_through_m: vec![[-2.25, -1.125], [1.5, 2.375]],
         }],
         clusters: vec![v1::ObservedCluster {
             hull_m: vec![[3.0, 1.0], [3.5, 1.0], [3.25, 1.5]],

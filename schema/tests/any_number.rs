@@ -29,6 +29,7 @@ fn fractions(c: &mut v1::Contribution) -> Vec<&mut f64> {
         all.extend([&mut s.rho_m, &mut s.alpha_rad, &mut s.from_m, &mut s.to_m]);
         all.extend(s.covariance.as_flattened_mut());
         all.extend(s.ends.iter_mut().map(|end| &mut end.sd_m));
+        all.extend(s.seen_through_m.as_flattened_mut());
     }
     for k in &mut c.clusters {
         all.extend(k.hull_m.as_flattened_mut());
@@ -101,6 +102,12 @@ fn assert_sound(c: &Contribution) {
         assert!(s.ends.iter().all(|end| (0.001..=100.0).contains(&end.sd)));
         assert_point_in_level(c, &line.at(s.from));
         assert_point_in_level(c, &line.at(s.to));
+        assert!(s.seen_through.windows(2).all(|pair| pair[0].to <= pair[1].from));
+        for through in &s.seen_through {
+            assert!(through.from < through.to);
+            assert_point_in_level(c, &line.at(through.from_m()));
+            assert_point_in_level(c, &line.at(through.to_m()));
+        }
     }
     for k in &c.clusters {
         assert!(!k.hull.is_empty() && k.points as usize >= k.hull.len());

@@ -23,7 +23,7 @@ use mapfold_schema::codec::{self, CBOR, JSON};
 use mapfold_schema::digest::content_digest;
 use mapfold_schema::instant::{parse_rfc3339, to_rfc3339};
 use mapfold_schema::v1;
-use proptest::collection::{btree_map, vec};
+use proptest::collection::{btree_map, btree_set, vec};
 use proptest::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -183,10 +183,14 @@ fn observed_segment() -> impl Strategy<Value = ObservedSegment> {
     (
         (0.0..50.0_f64, angle(), covariance([0.02, 0.01])),
         (-50.0..50.0_f64, 0.02..80.0_f64, facing(), [end.clone(), end], 1..u32::MAX),
+        btree_set(-60_000..60_000_i64, 0..5),
     )
-        .prop_map(|((rho, alpha, covariance), (from, length, facing, ends, points))| {
+        .prop_map(|((rho, alpha, covariance), (from, length, facing, ends, points), marks)| {
             let line = UncertainLine { line: Line::normal_form(rho, alpha).0, covariance };
-            ObservedSegment { line, from, to: from + length, facing, ends, points }
+            let marks: Vec<i64> = marks.into_iter().collect();
+            let seen_through =
+                marks.chunks_exact(2).map(|m| Interval { from: m[0], to: m[1] }).collect();
+            ObservedSegment { line, from, to: from + length, facing, ends, points, seen_through }
         })
 }
 

@@ -755,6 +755,12 @@ export interface components {
              */
             rho_m: number;
             /**
+             * @description Stretches of the supporting line, [from, to] along it, that beams of this look crossed before
+             *     they ended well behind it, such as open doors beside this piece of wall: ascending, apart
+             *     from each other, at most 64, to the nearest millimetre.
+             */
+            seen_through_m?: number[][];
+            /**
              * Format: double
              * @description Upper end, more than `from_m`.
              */

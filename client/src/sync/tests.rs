@@ -56,6 +56,7 @@ pub(super) fn contribution(n: u64) -> v1::Contribution {
             facing: v1::Facing::Origin,
             ends: [end(), end()],
             points: 40,
+            seen_through_m: Vec::new(),
         }],
         clusters: Vec::new(),
         evidence: vec![v1::EvidencePatch {

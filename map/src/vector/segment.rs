@@ -44,7 +44,7 @@ pub struct ObservedEnd {
 }
 
 /// A straight piece of wall in one look, in the robot frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ObservedSegment {
     /// Supporting line with the sensor's covariance only.
     pub line: UncertainLine<Robot>,
@@ -58,6 +58,10 @@ pub struct ObservedSegment {
     pub ends: [ObservedEnd; 2],
     /// Number of beams that support it.
     pub points: u32,
+    /// Stretches of the supporting line that beams of this look crossed before they ended well
+    /// behind it: there is no wall. Millimetres along the line as `from` and `to`, ascending,
+    /// disjoint. What is in none of them may have been hidden as well as solid.
+    pub seen_through: Vec<Interval>,
 }
 
 /// A piece of a wall that was seen and not seen through.

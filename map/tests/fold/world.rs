@@ -88,6 +88,7 @@ pub(crate) fn observe(
         facing: Facing::Origin,
         ends: [end, end],
         points: (half * 40.0) as u32 + 5,
+        seen_through: Vec::new(),
     }
 }
 

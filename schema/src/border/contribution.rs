@@ -61,6 +61,7 @@ fn wire_observed_segment(segment: &ObservedSegment) -> v1::ObservedSegment {
             .ends
             .map(|ObservedEnd { kind, sd }| v1::ObservedEnd { kind: kind.into(), sd_m: sd }),
         points: segment.points,
+        seen_through_m: segment.seen_through.iter().map(|i| [i.from_m(), i.to_m()]).collect(),
     }
 }
 

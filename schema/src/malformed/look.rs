@@ -90,6 +90,30 @@ fn segments(base: &Value, target: &Target) -> Vec<Fault> {
         at("/segments/0/ends/0/sd_m", json!(-0.01), "negative", "a negative standard deviation"),
         at("/segments/0/ends/1/sd_m", json!(1e9), "out_of_range", "an end that may be anywhere"),
         at("/segments/0/points", json!(0), "no_points", "a segment that no beam saw"),
+        at(
+            "/segments/0/seen_through_m",
+            json!(vec![[2.0, 3.0]; 65]),
+            "too_many_seen_through",
+            "a wall like a comb",
+        ),
+        at(
+            "/segments/0/seen_through_m/0",
+            json!([-1.125, -2.25]),
+            "out_of_order",
+            "a view through a wall backwards",
+        ),
+        at(
+            "/segments/0/seen_through_m/1",
+            json!([-1.5, 2.0]),
+            "out_of_order",
+            "views through a wall that overlap",
+        ),
+        at(
+            "/segments/0/seen_through_m/1/1",
+            json!(1e300),
+            "out_of_range",
+            "a view through a wall without end",
+        ),
         Fault::of(
             vec![
                 ("/pose/x_m", Some(json!(max - 0.5))),

@@ -42,6 +42,7 @@ pub(super) fn catalogue() -> Vec<Fault> {
         set("/segments/0/ends", json!([{"kind": "jump", "sd_m": 0.1}]), "one end only"),
         set("/segments/0/points", json!(-1), "a negative count"),
         set("/segments/0/points", json!(1.5), "a fractional count"),
+        set("/segments/0/seen_through_m/0", json!([1.0]), "a stretch with one end"),
         set("/clusters/0/points", json!(5_000_000_000_u64), "a count of more than 32 bits"),
         set("/clusters/0/hull_m/0", json!([1.0, 2.0, 3.0]), "a point of three coordinates"),
         set("/evidence/0/sensor", json!("radar"), "an unknown class of sensor"),

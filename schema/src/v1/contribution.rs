@@ -82,6 +82,11 @@ pub struct ObservedSegment {
     pub ends: [ObservedEnd; 2],
     /// Number of beams that support it.
     pub points: u32,
+    /// Stretches of the supporting line, [from, to] along it, that beams of this look crossed before
+    /// they ended well behind it, such as open doors beside this piece of wall: ascending, apart
+    /// from each other, at most 64, to the nearest millimetre.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub seen_through_m: Vec<[f64; 2]>,
 }
 
 /// An end of an observed segment.

@@ -140,6 +140,7 @@ fn segments(numbers: &mut Numbers, at: [f64; 2], heading: f64) -> Vec<v1::Observ
                 v1::ObservedEnd { kind: v1::EndKind::Jump, sd_m: 0.02 },
             ],
             points: 10 + numbers.below(90) as u32,
+            seen_through_m: Vec::new(),
         });
     }
     seen

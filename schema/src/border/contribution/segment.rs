@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use mapfold_map::geometry::{Level, Pose, Robot, UncertainLine};
+use mapfold_map::geometry::{Interval, Level, Pose, Robot, UncertainLine};
 use mapfold_map::vector::{ObservedEnd, ObservedSegment};
 
 use crate::border::Limits;
@@ -26,6 +26,8 @@ const SD_FLOOR: [f64; 2] = [0.001, 0.000_349_065_850_398_865_9];
 const END_SD_FLOOR_M: f64 = 0.001;
 /// Largest standard deviation of an end along the line, metres.
 const END_SD_MAX_M: f64 = 100.0;
+/// Most stretches of one line that one look can have seen through.
+const SEEN_THROUGH_MAX: usize = 64;
 
 pub(super) fn check(
     segment: &v1::ObservedSegment,
@@ -43,14 +45,22 @@ pub(super) fn check(
     let span = check_span(segment, limits, place, wrong);
     let ends = check_ends(&segment.ends, &place.field("ends"), wrong);
     let points = some_points(segment.points, place, wrong);
+    let seen_through_place = place.field("seen_through_m");
+    let seen_through =
+        check_seen_through(&segment.seen_through_m, limits, &seen_through_place, wrong);
 
     let (line, turned) = UncertainLine::normal_form(rho?, alpha?, covariance?.floored(&SD_FLOOR));
     debug_assert!(!turned, "rho is not negative");
     let (from, to) = span?;
     if let Some(level_from_robot) = level_from_robot {
-        for (t, name) in [(from, "from_m"), (to, "to_m")] {
-            let end = level_from_robot.act(&line.line.at(t));
-            in_level(&end, limits, &place.field(name), wrong)?;
+        let inside = |t: f64, place: &Place<'_>, wrong: &mut Violations| {
+            in_level(&level_from_robot.act(&line.line.at(t)), limits, place, wrong)
+        };
+        inside(from, &place.field("from_m"), wrong)?;
+        inside(to, &place.field("to_m"), wrong)?;
+        for through in seen_through.iter().flatten() {
+            inside(through.from_m(), &seen_through_place, wrong)?;
+            inside(through.to_m(), &seen_through_place, wrong)?;
         }
     }
     Some(ObservedSegment {
@@ -60,7 +70,48 @@ pub(super) fn check(
         facing: segment.facing.into(),
         ends: ends?,
         points: points?,
+        seen_through: seen_through?,
     })
+}
+
+/// The stretches that were seen through, in whole millimetres; what is less vanishes.
+fn check_seen_through(
+    stretches: &[[f64; 2]],
+    limits: &Limits,
+    place: &Place<'_>,
+    wrong: &mut Violations,
+) -> Option<Vec<Interval>> {
+    if stretches.len() > SEEN_THROUGH_MAX {
+        let n = stretches.len();
+        wrong.add(
+            place,
+            "too_many_seen_through",
+            format_args!("{n} stretches: one look sees through at most {SEEN_THROUGH_MAX}"),
+        );
+        return None;
+    }
+    let mut checked: Vec<Interval> = Vec::with_capacity(stretches.len());
+    let mut before = f64::NEG_INFINITY;
+    for (i, [from, to]) in stretches.iter().enumerate() {
+        let place = place.index(i);
+        let from = coordinate(*from, limits, &place.index(0), wrong);
+        let to = coordinate(*to, limits, &place.index(1), wrong);
+        let (from, to) = (from?, to?);
+        if from >= to || from < before {
+            wrong.add(
+                &place,
+                "out_of_order",
+                "stretches seen through ascend, apart from each other, from before to",
+            );
+            return None;
+        }
+        before = to;
+        let stretch = Interval::from_metres(from, to);
+        if stretch.length() > 0 {
+            checked.push(stretch);
+        }
+    }
+    Some(checked)
 }
 
 /// The two coordinates along the line.
