@@ -58,9 +58,7 @@ pub async fn maps(
         faults.extend(faults_of(&source.name, &outcomes));
     }
     if only.is_none() {
-        let text = std::fs::read_to_string(page).map_err(|e| Error::file(page, e))?;
-        let text = report::replace(&text, "maps", &report::table(&HEADER, &rows))?;
-        std::fs::write(page, text).map_err(|e| Error::file(page, e))?;
+        report::rewrite(page, "maps", &report::table(&HEADER, &rows))?;
     }
     Ok(faults)
 }
@@ -102,7 +100,7 @@ fn faults_of(name: &str, outcomes: &[Outcome]) -> Vec<String> {
     faults
 }
 
-const HEADER: [&str; 13] = [
+const HEADER: [&str; 12] = [
     "log",
     "engine",
     "scans",
@@ -115,7 +113,6 @@ const HEADER: [&str; 13] = [
     "GeoJSON kB",
     "explained %",
     "through %",
-    "along %",
 ];
 
 fn row(name: &str, log: &Log, outcome: &Outcome) -> Vec<String> {
@@ -134,7 +131,6 @@ fn row(name: &str, log: &Log, outcome: &Outcome) -> Vec<String> {
         (outcome.exports.first().map_or(0, Vec::len) / 1000).to_string(),
         format!("{:.2}", 100.0 * coverage.explained_share()),
         format!("{:.2}", 100.0 * coverage.through_share()),
-        format!("{:.2}", 100.0 * coverage.through_along_share()),
     ]
 }
 

@@ -109,11 +109,11 @@ impl Floor {
         self.tiles.get(&tile).map_or(0, |sums| sums[offset as usize])
     }
 
-    /// How far a beam goes on behind the pieces that it crosses: the farthest of them. Pieces that
-    /// lie within `near_m` of the beam's end explain it.
-    pub fn behind(&self, beam: &Piece, near_m: f64) -> Behind {
+    /// How far a beam goes on, along itself, behind the first of the pieces that it crosses; 0 if
+    /// it crosses none.
+    pub fn behind_m(&self, beam: &Piece) -> f64 {
         let length = beam.length();
-        let mut behind = Behind::default();
+        let mut behind_m: f64 = 0.0;
         // Half a bin a step, and every bin reaches half a bin farther than its square: no piece
         // that the beam crosses is missed.
         let steps = (length / (0.5 * BIN_M)).ceil().max(1.0) as usize;
@@ -124,28 +124,13 @@ impl Floor {
                 beam.a.y + share * (beam.b.y - beam.a.y),
             );
             for index in self.piece_bins.at(at) {
-                let piece = &self.pieces[index];
-                if let Some(share) = beam.crossing(piece) {
-                    let along_m = (1.0 - share) * length;
-                    behind.any_m = behind.any_m.max(along_m);
-                    if piece.distance(beam.b) > near_m {
-                        behind.unexplained_m = behind.unexplained_m.max(along_m);
-                    }
+                if let Some(share) = beam.crossing(&self.pieces[index]) {
+                    behind_m = behind_m.max((1.0 - share) * length);
                 }
             }
         }
-        behind
+        behind_m
     }
-}
-
-/// How far a beam goes on behind walls, along itself, metres.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Behind {
-    /// Behind any wall. A beam that grazes a wall runs far along it for an error of a few
-    /// centimetres across.
-    pub any_m: f64,
-    /// Behind walls that do not explain where it ended.
-    pub unexplained_m: f64,
 }
 
 /// The solid parts of a segment as pieces: `from_m` and `to_m` run from the foot point of the
@@ -255,15 +240,11 @@ mod tests {
     fn a_beam_runs_through_a_wall_only_if_it_goes_on_behind_it() {
         let floor = Floor::new(&[wall(30.0)], &[], &[], 0.05, 0.1);
         let beam = |top: f64| Piece { a: Point::new(29.0, -20.0), b: Point::new(29.0, top) };
-        let near = 0.1;
-        assert!((floor.behind(&beam(2.3), near).unexplained_m - 0.3).abs() < 1e-9);
-        assert!((floor.behind(&beam(2.3), near).any_m - 0.3).abs() < 1e-9);
-        assert_eq!(floor.behind(&beam(1.9), near), Behind::default());
+        assert!((floor.behind_m(&beam(2.3)) - 0.3).abs() < 1e-9);
+        assert!(floor.behind_m(&beam(1.9)) <= 0.0);
         let past = Piece { a: Point::new(31.0, 0.0), b: Point::new(31.0, 9.0) };
-        assert_eq!(floor.behind(&past, near), Behind::default());
-        let grazing = |top| Piece { a: Point::new(26.0, 1.9), b: Point::new(29.0, top) };
-        let behind = floor.behind(&grazing(2.09), near);
-        assert!(behind.any_m > 1.0 && behind.unexplained_m < 1e-9);
-        assert!(floor.behind(&grazing(2.11), near).unexplained_m > 1.0);
+        assert!(floor.behind_m(&past) <= 0.0);
+        let grazing = Piece { a: Point::new(26.0, 1.9), b: Point::new(29.0, 2.09) };
+        assert!(floor.behind_m(&grazing) > 1.0);
     }
 }

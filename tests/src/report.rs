@@ -1,5 +1,7 @@
 //! Tables between markers in a page of text: the rest of the page is people's.
 
+use std::path::Path;
+
 use crate::Error;
 
 /// Replaces what stands between the markers of `name` in `page`.
@@ -14,6 +16,15 @@ pub fn replace(page: &str, name: &str, content: &str) -> Result<String, Error> {
     let from = page.find(&begin).ok_or_else(fault)? + begin.len();
     let to = from + page[from..].find(&end).ok_or_else(fault)?;
     Ok(format!("{}\n\n{}\n\n{}", &page[..from], content.trim(), &page[to..]))
+}
+
+/// Replaces what stands between the markers of `name` in the file `page`.
+///
+/// # Errors
+/// The file cannot be read or written, or has no such markers.
+pub fn rewrite(page: &Path, name: &str, content: &str) -> Result<(), Error> {
+    let text = std::fs::read_to_string(page).map_err(|e| Error::file(page, e))?;
+    std::fs::write(page, replace(&text, name, content)?).map_err(|e| Error::file(page, e))
 }
 
 fn head(page: &str) -> String {

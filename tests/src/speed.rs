@@ -35,10 +35,8 @@ pub fn benches(page: &Path, criterion: &Path) -> Result<Vec<String>, Error> {
         return Ok(vec![format!("{} holds no figures", criterion.display())]);
     }
     rows.sort();
-    let text = std::fs::read_to_string(page).map_err(|e| Error::file(page, e))?;
     let header = ["benchmark", "mean", "95 % from", "to"];
-    let text = report::replace(&text, "benches", &report::table(&header, &rows))?;
-    std::fs::write(page, text).map_err(|e| Error::file(page, e))?;
+    report::rewrite(page, "benches", &report::table(&header, &rows))?;
     Ok(Vec::new())
 }
 

@@ -52,12 +52,10 @@ impl Outcome {
         let seconds = self.run.wall.as_secs_f64();
         let coverage = self.coverage.map_or(String::new(), |coverage| {
             format!(
-                ", {:.2} % of {} returns explained, {:.2} % run through a segment (along \
-                 the beam: {:.2} %)",
+                ", {:.2} % of {} returns explained, {:.2} % run through a segment",
                 100.0 * coverage.explained_share(),
                 coverage.returns,
-                100.0 * coverage.through_share(),
-                100.0 * coverage.through_along_share()
+                100.0 * coverage.through_share()
             )
         });
         format!(

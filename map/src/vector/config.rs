@@ -26,9 +26,14 @@ pub struct VectorConfig {
     pub free_below: f64,
     /// A look vouches for a wall up to this many standard deviations before where it saw it end.
     pub end_margin: f64,
+    /// A wall ends where less than this share of the looks cover it that do nearby.
+    pub thin_share: f64,
+    /// How far along the wall nearby is, metres.
+    pub thin_reach: f64,
     /// Scanner evidence that one look gives for a free cell, nats (positive).
     pub free_look: f64,
-    /// A wall is seen through where more than this share of the looks at it went through it.
+    /// A wall is seen through where more than this share of the looks at it went through it, and
+    /// more than one.
     pub through_share: f64,
     /// A wall is seen through where this much of it in a row lies in free cells only, metres.
     pub seen_through_min: f64,
@@ -57,13 +62,15 @@ impl VectorConfig {
         trace_scale: [0.05, 0.035],
         datum_position_sd: 0.01,
         datum_heading_sd: 0.001,
-        free_below: -1.0,
-        end_margin: 1.5,
+        free_below: -0.5,
+        end_margin: 2.0,
+        thin_share: 0.3,
+        thin_reach: 1.0,
         free_look: 0.4,
-        through_share: 0.25,
+        through_share: 0.1,
         seen_through_min: 0.10,
         length_min: 0.2,
-        duplicate_offset: 0.12,
+        duplicate_offset: 0.18,
         thickness_max: 0.30,
         cluster_gap: 0.10,
         cluster_gap_max: 0.30,

@@ -43,8 +43,8 @@ const CELLS_BEHIND: [i32; 2] = [2, 3];
 /// The parts of `pieces` (ascending, disjoint) that scanners have looked through. Two things
 /// count, sample by sample:
 /// * the cells on and beside the line are all free, or
-/// * the cells just behind it are free by more looks than a share (`config.through_share`) of those
-///   that saw the wall there, not counting the looks at another face close behind it (`backs`),
+/// * the cells just behind it are free by more than one look, and by more than a share
+///   (`config.through_share`) of those that saw the wall there, not counting the looks at another face close behind it (`backs`),
 ///   whose viewers freed those cells.
 ///
 /// Single samples inside a piece are noise; ends are trimmed sample by sample.
@@ -77,7 +77,8 @@ pub(super) fn seen_through<E: Evidence>(
                 let behind = CELLS_BEHIND.iter().map(|cells| value(-cells)).max().unwrap_or(0);
                 let through = f64::from(-behind.min(0)) / f64::from(one_look);
                 let others = || backs.iter().map(|back| back.looks_beside(&p)).sum::<i64>() as f64;
-                let allowed = config.through_share * wall.looks_at(middle) as f64;
+                let looks = wall.looks_at(middle) as f64;
+                let allowed = (config.through_share * looks).max(1.0);
                 through > allowed && through - others() > allowed
             };
             match (seen, open) {

@@ -4,7 +4,8 @@ use super::fusion::{FusedLine, fuse};
 use super::sighting::Sighting;
 use super::{EndKind, Facing, VectorConfig};
 use crate::geometry::{
-    Covariance, Interval, Level, Line, Point, UncertainLine, tangent, union_intervals, unit_normal,
+    Covariance, Interval, Level, Line, Point, UncertainLine, subtract_intervals, tangent,
+    union_intervals, unit_normal,
 };
 use crate::level::{FeatureId, RobotName};
 
@@ -72,7 +73,10 @@ impl Wall {
             count += *change;
             *change = count;
         }
-        let seen = union_intervals(&seen, BRIDGE_MM);
+        let seen = subtract_intervals(
+            &union_intervals(&seen, BRIDGE_MM),
+            &thinly_covered(&covers, config.thin_share, config.thin_reach),
+        );
         Some(Self {
             line,
             independent,
@@ -162,6 +166,37 @@ impl Wall {
         }
         union_intervals(&shared, 0)
     }
+}
+
+/// Where fewer than a `share` of the looks cover a wall than do within `reach` metres: looks that
+/// err outwards, not the wall, go on there. Ascending, disjoint.
+fn thinly_covered(covers: &[(i64, i64)], share: f64, reach: f64) -> Vec<Interval> {
+    let reach = (reach * 1e3).round() as i64;
+    let most = covers.iter().map(|(_, count)| *count).max().unwrap_or(0) as f64;
+    let mut thin = Vec::new();
+    for (k, pair) in covers.windows(2).enumerate() {
+        let (step, count) = (Interval { from: pair[0].0, to: pair[1].0 }, pair[0].1);
+        let outweighs = |other: i64| other as f64 * share > count as f64;
+        if count == 0 || step.length() == 0 || most * share <= count as f64 {
+            continue;
+        }
+        let before = covers[..=k]
+            .windows(2)
+            .rev()
+            .take_while(|other| other[1].0 + reach > step.from)
+            .find(|other| outweighs(other[0].1));
+        if let Some(other) = before {
+            thin.push(Interval { from: step.from, to: step.to.min(other[1].0 + reach) });
+        }
+        let after = covers[k + 1..]
+            .iter()
+            .take_while(|other| other.0 - reach < step.to)
+            .find(|other| outweighs(other.1));
+        if let Some(other) = after {
+            thin.push(Interval { from: step.from.max(other.0 - reach), to: step.to });
+        }
+    }
+    union_intervals(&thin, 0)
 }
 
 /// A fused line in normal form about the level's origin. Its normal points to free space; in normal

@@ -53,7 +53,7 @@ fn looks_at_one_wall_become_one_segment_that_counts_them() {
     let segment = only(&level);
     assert_eq!(segment.looks, 9);
     assert_eq!(segment.solid.len(), 1);
-    // Each end is drawn in by 1.5 standard deviations of its place, here 17 mm.
+    // Each end is drawn in by two standard deviations of its place, here 23 mm.
     assert!((segment.solid[0].span.length() - 4970).abs() < 25);
     for end in [wall.0, wall.1] {
         assert!(segment.line.across(&end).abs() < 0.01);
@@ -150,6 +150,22 @@ fn what_many_looks_went_through_is_open_although_others_hit_it() {
     let gap = |looks: &[Contribution]| 4000 - solid(&folded(looks));
     assert_eq!(gap(&looked_through(1)) / 100, 0, "one look of five may err");
     assert!((gap(&looked_through(2)) - 1000).abs() <= 100);
+}
+
+#[test]
+fn a_wall_ends_where_nearly_all_looks_say_it_does() {
+    let wall = |to| (Point::new(1.0, 3.0), Point::new(to, 3.0));
+    let looks = |bold: u64| -> Vec<Contribution> {
+        let sober = (0..8).map(|i| look(i, &[wall(4.0)], Point::new(3.0, 1.0), EXACT));
+        let bold = (8..8 + bold).map(|i| look(i, &[wall(4.6)], Point::new(3.0, 1.0), EXACT));
+        sober.chain(bold).collect()
+    };
+    // Ends are drawn in by two standard deviations.
+    assert!((solid(&folded(&looks(1))) - 3000).abs() < 60, "one of nine errs outwards");
+    assert!((solid(&folded(&looks(6))) - 3600).abs() < 60, "six of fourteen saw more");
+    // What lies farther from there than they all reach, others may just not have seen.
+    let far = [looks(0), vec![look(8, &[wall(9.0)], Point::new(3.0, 1.0), EXACT)]].concat();
+    assert!((solid(&folded(&far)) - 7000).abs() < 60);
 }
 
 #[test]
