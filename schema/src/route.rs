@@ -16,6 +16,10 @@ pub const ROBOT_TOKENS: &str = "/api/v1/sites/{site}/robots/{robot}/tokens";
 pub const CONTRIBUTIONS: &str = "/api/v1/sites/{site}/levels/{level}/contributions";
 /// `GET`: one contribution.
 pub const CONTRIBUTION: &str = "/api/v1/sites/{site}/levels/{level}/contributions/{id}";
+/// `GET, POST`: reverts.
+pub const REVERTS: &str = "/api/v1/sites/{site}/levels/{level}/reverts";
+/// `GET, DELETE`: one revert; deleting it puts back what it took out.
+pub const REVERT: &str = "/api/v1/sites/{site}/levels/{level}/reverts/{id}";
 /// `GET`: segments and clusters.
 pub const VECTOR: &str = "/api/v1/sites/{site}/levels/{level}/vector";
 /// `GET`: changed tiles.

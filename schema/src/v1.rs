@@ -6,6 +6,7 @@ mod features;
 mod level;
 mod patch;
 mod receipt;
+mod revert;
 mod robot;
 mod session;
 mod site;
@@ -21,6 +22,10 @@ pub use features::{Cluster, EndKind, Facing, Segment, SensorClass, SolidInterval
 pub use level::{Bounds, Counts, LevelDescription, NewLevel};
 pub use patch::{Patch, RasterChanges, Removed, TileAddress, TileEvidence, VectorPatch};
 pub use receipt::{Receipt, UploadAnswer};
+pub use revert::{
+    ChangeCounts, ChangeKind, ChangedFeature, FeatureKind, NewRevert, Revert, RevertPage,
+    RevertPreview, RevertRecord, RobotShare, Undone,
+};
 pub use robot::{
     LastPose, NewRobot, RobotDescription, RobotState, RobotUpdate, SensorKind, SensorProfile,
 };

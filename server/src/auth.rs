@@ -150,6 +150,12 @@ pub async fn open_session(
     Ok((token, session))
 }
 
+/// Public id of the token that people gave the principal: a session's is the one that it was
+/// opened with.
+pub fn granted_by(principal: &Principal) -> &str {
+    token::parent_id(&principal.token_id)
+}
+
 /// Whether the principal's token is a session's.
 pub fn is_session(principal: &Principal) -> bool {
     token::parent_id(&principal.token_id) != principal.token_id

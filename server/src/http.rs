@@ -33,6 +33,7 @@ mod levels;
 mod page;
 mod patches;
 mod raster;
+mod reverts;
 mod robots;
 mod session;
 mod sites;

@@ -2,7 +2,8 @@
 //!
 //! A contribution is *accepted* (checked and encoded, by the caller), *appended* to the log
 //! together with whatever else is waiting, acknowledged, *folded*, *published* as a new
-//! [`Snapshot`] and *written behind*. Memory is a cache of the store, never the reverse: whatever
+//! [`Snapshot`] and *written behind*. Acts (reverts and their undoing) go into the same log and
+//! are folded like contributions. Memory is a cache of the store, never the reverse: whatever
 //! fails here, the level is dropped and read back. Knows the store and the map, not HTTP.
 
 mod accept;
@@ -13,9 +14,11 @@ mod history;
 mod open;
 pub(crate) mod recall;
 mod registry;
+mod reverting;
 pub(crate) mod rows;
 mod since;
 mod snapshot;
+mod trial;
 mod write_behind;
 
 use std::sync::Arc;
@@ -30,11 +33,15 @@ use uuid::Uuid;
 
 pub use accept::Accepted;
 pub use registry::{LevelError, LevelOptions, Levels};
+pub use reverting::RevertError;
 pub use since::SinceError;
 pub use snapshot::Snapshot;
 
+use crate::store::Store;
 use crate::store::levels::LevelRow;
 use append::Waiting;
+use registry::DiskAlarm;
+use trial::Trial;
 
 /// Why a contribution was not acknowledged. Nothing of it is in the log then, except after
 /// [`SubmitError::Unavailable`], which leaves that open: sending it again is safe and tells.
@@ -91,6 +98,10 @@ struct Shared {
     head: Arc<AtomicI64>,
     /// Tells the fold to look at the log now.
     look: Arc<Notify>,
+    /// Acts to be tried out by the fold.
+    trials: mpsc::Sender<Trial>,
+    store: Store,
+    alarm: DiskAlarm,
 }
 
 /// An open level. Clones are cheap; as long as one is held the level stays open.

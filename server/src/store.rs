@@ -5,14 +5,17 @@
 //!
 //! * [`sites`], [`levels`], [`robots`], [`tokens`]: what people set up.
 //! * [`contributions`]: the append to a level's log, the one path to an acknowledgement.
+//! * [`acts`]: what operators did to a log; [`revision_list`]: the columns that say to what.
 //! * [`log`]: reading the log; [`payload`]: the two columns that hold a contribution.
 //! * [`map_rows`]: the folded map, written behind; [`tile_cells`]: the column that holds a tile.
 
+pub mod acts;
 pub mod contributions;
 pub mod levels;
 pub mod log;
 pub mod map_rows;
 pub mod payload;
+pub mod revision_list;
 pub mod robots;
 pub mod sites;
 pub mod tile_cells;

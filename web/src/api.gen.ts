@@ -219,6 +219,56 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/sites/{site}/levels/{level}/reverts": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The reverts of a level, newest first, in pages. */
+        get: operations["list_reverts"];
+        put?: never;
+        /**
+         * Takes contributions out of the map: it is then bit for bit what it would have been without
+         *     them. Needs `map:edit`.
+         * @description Either `contributions` are named, or a `robot` and, from `from` to before `to`, a span of the
+         *     time at which it saw them; 20000 at most. The answer comes when the revert is in the log, as one
+         *     revision; the map follows like after an upload. The same revert sent again under the same id is
+         *     answered in the same way. Contributions that come later are not affected. With `preview=true`
+         *     nothing is changed: the answer, of status 200, tells what would be.
+         */
+        post: operations["revert"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/sites/{site}/levels/{level}/reverts/{id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** One revert, with the contributions that it covers. */
+        get: operations["read_revert"];
+        put?: never;
+        post?: never;
+        /**
+         * Undoes a revert: puts back what it took out, but for what another revert that stands covers
+         *     too. Needs `map:edit`.
+         * @description An entry of the log of its own, with a revision of its own. One that is undone already stays as
+         *     it is, with the same answer. With `preview=true` nothing is changed: the answer is a
+         *     `RevertPreview` of what would be.
+         */
+        delete: operations["undo_revert"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/sites/{site}/levels/{level}/tiles/{z}/{row}/{col}.png": {
         parameters: {
             query?: never;
@@ -404,6 +454,38 @@ export interface components {
              */
             min_y_m: number;
         };
+        /** @description How many things of a kind would change. */
+        ChangeCounts: {
+            /**
+             * Format: int32
+             * @description Things that would look different.
+             */
+            changed: number;
+            /**
+             * Format: int32
+             * @description Things that the map does not have now.
+             */
+            new: number;
+            /**
+             * Format: int32
+             * @description Things that would be no more.
+             */
+            removed: number;
+        };
+        /**
+         * @description What becomes of a thing.
+         * @enum {string}
+         */
+        ChangeKind: "new" | "changed" | "removed";
+        /** @description A segment or a cluster that would change. */
+        ChangedFeature: {
+            /** @description What would become of it. */
+            change: components["schemas"]["ChangeKind"];
+            /** @description Its identity. */
+            id: string;
+            /** @description What it is. */
+            kind: components["schemas"]["FeatureKind"];
+        };
         /** @description A thing of the map that no line explains. */
         Cluster: {
             /** @description Fused centroid. */
@@ -533,6 +615,11 @@ export interface components {
             contributions: number;
             /**
              * Format: int64
+             * @description Those of them that are in the map: neither held nor reverted.
+             */
+            in_force?: number;
+            /**
+             * Format: int64
              * @description Published segments.
              */
             segments: number;
@@ -559,6 +646,11 @@ export interface components {
          * @enum {string}
          */
         Facing: "origin" | "away";
+        /**
+         * @description Kinds of features.
+         * @enum {string}
+         */
+        FeatureKind: "segment" | "cluster";
         /** @description A new token. The secret is shown this once. */
         IssuedToken: {
             /** @description Public identity, for `token revoke`. */
@@ -643,6 +735,11 @@ export interface components {
         LevelEvent: {
             /**
              * Format: int32
+             * @description Number of acts of operators (reverts, and their undoing) among the revisions.
+             */
+            acts?: number;
+            /**
+             * Format: int32
              * @description Number of changed or removed segments and clusters.
              */
             features: number;
@@ -675,6 +772,25 @@ export interface components {
              * @description Edge of a cell; 0.05 if absent.
              */
             resolution_m?: number | null;
+        };
+        /** @description Which contributions are to be taken out: either `contributions`, or a `robot` and a time span. */
+        NewRevert: {
+            /** @description These contributions, at most 1000. */
+            contributions?: string[] | null;
+            /** @description What was seen at this instant or later, by the robot's clock, RFC 3339. */
+            from?: string | null;
+            /**
+             * Format: uuid
+             * @description A UUID made by whoever asks, so that asking twice is asking once; made by the server if
+             *     absent.
+             */
+            id?: string | null;
+            /** @description Why, for those who read the log; may be absent from a preview. */
+            reason?: string;
+            /** @description All contributions of this robot, within the span if there is one. */
+            robot?: string | null;
+            /** @description What was seen before this instant, by the robot's clock, RFC 3339. */
+            to?: string | null;
         };
         /** @description A robot to be enrolled. */
         NewRobot: {
@@ -876,7 +992,7 @@ export interface components {
              * @description Its place in the level's log.
              */
             revision: number;
-            /** @description Folded or held. */
+            /** @description Folded or held, as it was taken; whether it was reverted since is in the log. */
             state: components["schemas"]["ContributionState"];
         };
         /** @description Identities of what is no more. */
@@ -887,6 +1003,89 @@ export interface components {
             segments?: string[];
             /** @description Tiles. */
             tiles?: components["schemas"]["TileAddress"][];
+        };
+        /** @description A revert as the log has it. */
+        Revert: {
+            /** @description When the server took it. */
+            at: string;
+            /** @description Public id of the token that asked for it. */
+            author: string;
+            /**
+             * Format: int32
+             * @description Contributions that it covers: they stay out for as long as it stands.
+             */
+            contributions: number;
+            /** @description The beginning of that span, if it has one. */
+            from?: string | null;
+            /**
+             * Format: uuid
+             * @description Its identity.
+             */
+            id: string;
+            /** @description Why. */
+            reason: string;
+            /**
+             * Format: int64
+             * @description Its place in the level's log.
+             */
+            revision: number;
+            /** @description The robot, if a robot and a span were asked for. */
+            robot?: string | null;
+            /** @description Whose the covered ones are, by robot. */
+            robots: components["schemas"]["RobotShare"][];
+            /**
+             * Format: int32
+             * @description Those of them that were in the map until then; another revert had taken out the others.
+             */
+            taken_out: number;
+            /** @description The end of that span, if it has one. */
+            to?: string | null;
+            undone?: components["schemas"]["Undone"] | null;
+        };
+        /** @description A page of the reverts of a level. */
+        RevertPage: {
+            /** @description Pass as `cursor` for the next page; absent on the last. */
+            next?: string | null;
+            /** @description Reverts, newest first. */
+            reverts: components["schemas"]["Revert"][];
+        };
+        /** @description What a revert, or undoing one, would change. */
+        RevertPreview: {
+            bounds?: components["schemas"]["Bounds"] | null;
+            /** @description Clusters. */
+            clusters: components["schemas"]["ChangeCounts"];
+            /**
+             * Format: int32
+             * @description Contributions that it covers.
+             */
+            contributions: number;
+            /** @description The segments and clusters that would change, at most 200. */
+            features: components["schemas"]["ChangedFeature"][];
+            /** @description Whether there are more of them. */
+            more_features: boolean;
+            /**
+             * Format: int32
+             * @description Those of them that it would take out of the map, or put back into it.
+             */
+            moved: number;
+            /**
+             * Format: int64
+             * @description The revision of the map for which this holds.
+             */
+            revision: number;
+            /** @description Whose the covered ones are, by robot. */
+            robots: components["schemas"]["RobotShare"][];
+            /** @description Segments. */
+            segments: components["schemas"]["ChangeCounts"];
+            /** @description Tiles of all layers. */
+            tiles: components["schemas"]["ChangeCounts"];
+        };
+        /** @description A revert and all that it covers. */
+        RevertRecord: {
+            /** @description The contributions that it covers, in the order of the log. */
+            contributions: string[];
+            /** @description The revert. */
+            revert: components["schemas"]["Revert"];
         };
         /** @description A robot as it is. */
         RobotDescription: {
@@ -907,6 +1106,11 @@ export interface components {
             queue_length?: number | null;
             /**
              * Format: int64
+             * @description Those of them that are reverted.
+             */
+            reverted?: number;
+            /**
+             * Format: int64
              * @description The revision that it runs, as it last reported.
              */
             revision?: number | null;
@@ -916,6 +1120,16 @@ export interface components {
             sensors: components["schemas"]["SensorProfile"][];
             /** @description Whether what it sends goes into the map. */
             state: components["schemas"]["RobotState"];
+        };
+        /** @description Contributions of one robot. */
+        RobotShare: {
+            /**
+             * Format: int32
+             * @description How many of them are its.
+             */
+            contributions: number;
+            /** @description The robot. */
+            robot: string;
         };
         /**
          * @description Whether what a robot sends goes into the map.
@@ -1107,6 +1321,23 @@ export interface components {
              * @description Tiles up from the level's origin.
              */
             y: number;
+        };
+        /** @description How a revert was undone. */
+        Undone: {
+            /** @description When the server took it. */
+            at: string;
+            /** @description Public id of the token that asked for it. */
+            author: string;
+            /**
+             * Format: int32
+             * @description Contributions that it put back into the map; another revert keeps the others out.
+             */
+            put_back: number;
+            /**
+             * Format: int64
+             * @description The undoing's place in the level's log.
+             */
+            revision: number;
         };
         /** @description The answer to one contribution of an array: either `{"receipt": ..}` or `{"problem": ..}`. */
         UploadAnswer: {
@@ -1845,6 +2076,196 @@ export interface operations {
             };
             /** @description `tile_not_found`: no evidence there */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    list_reverts: {
+        parameters: {
+            query?: {
+                /** @description `next` of the page before. */
+                cursor?: string;
+                /** @description Reverts of a page, at most 500; 50 if absent. */
+                limit?: number;
+            };
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description A page of reverts */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RevertPage"];
+                };
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    revert: {
+        parameters: {
+            query?: {
+                /** @description `true`: tell what would change, and change nothing. */
+                preview?: boolean;
+            };
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NewRevert"];
+            };
+        };
+        responses: {
+            /** @description What would change, for a preview */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RevertPreview"];
+                };
+            };
+            /** @description They are out */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Revert"];
+                };
+            };
+            /** @description `nothing_to_revert`: none of them is in the map; `revert_conflict`: the id is taken; `revert_undone`: this revert was undone since; `map_moved_on`: a preview was overtaken, ask again */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description `too_many_contributions`: name fewer, or a shorter span */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description `contributions_unknown`, `contributions_held`, `body_invalid`, each with `errors` */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_revert: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The revert */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RevertRecord"];
+                };
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    undo_revert: {
+        parameters: {
+            query?: {
+                /** @description `true`: tell what would change, and change nothing. */
+                preview?: boolean;
+            };
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The revert, undone */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Revert"];
+                };
+            };
+            /** @description `map_moved_on`: a preview was overtaken, ask again */
+            409: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -202,6 +202,7 @@ fn described(robot: &v1::NewRobot) -> v1::RobotDescription {
         revision: None,
         queue_length: None,
         contributions: 0,
+        reverted: 0,
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::{Contribution, ContributionId, FeatureId, LevelMap};
+use super::{Batch, Contribution, ContributionId, FeatureId, LevelMap, Misplaced};
 use crate::raster::{SensorClass, Tile, TileIndex, TileKey, TilePatch};
 use crate::vector::{Evidence, Things, VectorConfig, Walls};
 
@@ -131,6 +131,46 @@ impl Level {
         self.fold_features(&[], &removed, Changes { tiles, ..Changes::default() })
     }
 
+    /// Folds a batch in, at once: the same bits as [`Self::fold`] with its contributions.
+    ///
+    /// # Errors
+    /// One of them is in force already; nothing has changed then.
+    pub fn fold_batch(&mut self, batch: &Batch) -> Result<Changes, Misplaced> {
+        if let Some(id) = batch.contributions.keys().find(|id| self.in_force.contains(id)) {
+            return Err(Misplaced(*id));
+        }
+        self.in_force.extend(batch.contributions.keys());
+        let tiles = self.fold_sums(batch, Tile::add_tile);
+        let inserted: Vec<&Contribution> = batch.contributions.values().collect();
+        Ok(self.fold_features(&inserted, &[], Changes { tiles, ..Changes::default() }))
+    }
+
+    /// Takes a batch out, at once: the same bits as [`Self::unfold`] with its contributions.
+    ///
+    /// # Errors
+    /// One of them is not in force; nothing has changed then.
+    pub fn unfold_batch(&mut self, batch: &Batch) -> Result<Changes, Misplaced> {
+        if let Some(id) = batch.contributions.keys().find(|id| !self.in_force.contains(id)) {
+            return Err(Misplaced(*id));
+        }
+        for id in batch.contributions.keys() {
+            self.in_force.remove(id);
+        }
+        let tiles = self.fold_sums(batch, Tile::subtract_tile);
+        let removed: Vec<&Contribution> = batch.contributions.values().collect();
+        Ok(self.fold_features(&[], &removed, Changes { tiles, ..Changes::default() }))
+    }
+
+    /// Applies the summed evidence of a batch by `change`; returns the touched tiles.
+    fn fold_sums(&mut self, batch: &Batch, change: fn(&mut Tile, &Tile)) -> BTreeSet<TileKey> {
+        for (key, sums) in &batch.evidence {
+            change(Arc::make_mut(self.map.tiles.entry(*key).or_default()), sums);
+        }
+        let touched = batch.evidence.keys().copied().collect();
+        self.drop_empty(&touched);
+        touched
+    }
+
     /// Applies the evidence of `contributions` by `change`; returns the touched tiles.
     fn fold_evidence(
         &mut self,
@@ -146,12 +186,17 @@ impl Level {
                 touched.insert(key);
             }
         }
-        for key in &touched {
+        self.drop_empty(&touched);
+        touched
+    }
+
+    /// A tile without evidence is the same as none.
+    fn drop_empty(&mut self, touched: &BTreeSet<TileKey>) {
+        for key in touched {
             if self.map.tiles.get(key).is_some_and(|tile| tile.is_empty()) {
                 self.map.tiles.remove(key);
             }
         }
-        touched
     }
 
     fn fold_features(

@@ -115,4 +115,18 @@ impl Tile {
             }
         }
     }
+
+    /// Adds another tile's sums, cell by cell.
+    pub fn add_tile(&mut self, other: &Self) {
+        for (cell, more) in self.cells.iter_mut().zip(&*other.cells) {
+            *cell = cell.wrapping_add(*more);
+        }
+    }
+
+    /// Takes another tile's sums out again, exactly.
+    pub fn subtract_tile(&mut self, other: &Self) {
+        for (cell, less) in self.cells.iter_mut().zip(&*other.cells) {
+            *cell = cell.wrapping_sub(*less);
+        }
+    }
 }

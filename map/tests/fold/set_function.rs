@@ -1,6 +1,8 @@
 //! Any order, any batches, any detour through removals, and restoring: the same bits.
 
-use mapfold_map::level::{Contribution, Level, LevelConfig, LevelMap, apply, diff};
+use mapfold_map::level::{
+    Batch, Contribution, Level, LevelConfig, LevelMap, Misplaced, apply, diff,
+};
 use proptest::prelude::*;
 
 use crate::world::{Chance, NOISE, looks};
@@ -44,6 +46,38 @@ proptest! {
         level.fold(&removed);
         let back = folded(&all);
         prop_assert_eq!(level.map(), back.map());
+    }
+
+    #[test]
+    fn a_batch_is_the_same_as_its_contributions(seed: u64, out in 1_u64..39) {
+        let all = looks(seed, 40, NOISE);
+        let mut chance = Chance(seed ^ 1);
+        let (mut batch, mut kept) = (Batch::default(), Vec::new());
+        for look in chance.shuffled(all.clone()) {
+            if chance.bits() % 40 < out {
+                batch.add(look.clone());
+                batch.add(look);
+            } else {
+                kept.push(look);
+            }
+        }
+        let (never, full) = (folded(&kept), folded(&all));
+        let mut level = full.clone();
+        let before = level.map().clone();
+        let removed: Vec<Contribution> =
+            all.iter().filter(|look| !never.in_force().contains(&look.id)).cloned().collect();
+        prop_assert_eq!(batch.len(), removed.len());
+        let expected = full.clone().unfold(&removed);
+        prop_assert_eq!(level.unfold_batch(&batch), Ok(expected));
+        prop_assert_eq!(level.map(), never.map());
+        prop_assert_eq!(level.in_force(), never.in_force());
+        if let Some(first) = removed.iter().map(|look| look.id).min() {
+            prop_assert_eq!(level.unfold_batch(&batch), Err(Misplaced(first)));
+            prop_assert_eq!(level.map(), never.map());
+            level.fold_batch(&batch).unwrap();
+            prop_assert_eq!(level.fold_batch(&batch), Err(Misplaced(first)));
+        }
+        prop_assert_eq!(level.map(), &before);
     }
 
     #[test]

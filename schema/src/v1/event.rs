@@ -15,4 +15,7 @@ pub struct LevelEvent {
     pub features: u32,
     /// Number of changed or removed tiles.
     pub tiles: u32,
+    /// Number of acts of operators (reverts, and their undoing) among the revisions.
+    #[serde(default)]
+    pub acts: u32,
 }

@@ -70,6 +70,9 @@ pub struct Bounds {
 pub struct Counts {
     /// Contributions in the log.
     pub contributions: i64,
+    /// Those of them that are in the map: neither held nor reverted.
+    #[serde(default)]
+    pub in_force: i64,
     /// Published segments.
     pub segments: i64,
     /// Published clusters.

@@ -16,7 +16,7 @@ pub struct Receipt {
     pub revision: i64,
     /// When the server took it, RFC 3339.
     pub received_at: String,
-    /// Folded or held.
+    /// Folded or held, as it was taken; whether it was reverted since is in the log.
     pub state: ContributionState,
     /// SHA-256 of its canonical CBOR, lower-case hexadecimal.
     pub digest: String,

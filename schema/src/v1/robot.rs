@@ -118,4 +118,7 @@ pub struct RobotDescription {
     pub queue_length: Option<i64>,
     /// Contributions of it that the server has.
     pub contributions: i64,
+    /// Those of them that are reverted.
+    #[serde(default)]
+    pub reverted: i64,
 }

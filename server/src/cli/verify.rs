@@ -54,13 +54,18 @@ async fn asked_for(
 fn tell(report: &Report) -> Result<(), CommandError> {
     let verdict = if report.is_sound() { "sound" } else { "NOT SOUND" };
     say(&format!(
-        "{}/{}: {verdict}; revision {}, folded up to {}; {} contributions, {} segments, {} clusters, \
+        "{}/{}: {verdict}; revision {}, folded up to {}; {} contributions, {}{} segments, {} clusters, \
          {} tiles; map {}",
         report.site,
         report.level,
         report.revision,
         report.folded_revision,
         report.contributions,
+        if report.acts == 0 {
+            String::new()
+        } else {
+            format!("{} of them reverted, {} acts, ", report.reverted, report.acts)
+        },
         report.segments,
         report.clusters,
         report.tiles,

@@ -32,6 +32,8 @@ pub(super) trait Needs: Send + 'static {
 pub(super) struct Read;
 /// Needs `map:contribute`.
 pub(super) struct Contribute;
+/// Needs `map:edit`.
+pub(super) struct Edit;
 /// Needs `admin`.
 pub(super) struct Admin;
 
@@ -41,6 +43,10 @@ impl Needs for Read {
 
 impl Needs for Contribute {
     const SCOPE: Scope = Scope::MapContribute;
+}
+
+impl Needs for Edit {
+    const SCOPE: Scope = Scope::MapEdit;
 }
 
 impl Needs for Admin {

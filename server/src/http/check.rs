@@ -1,13 +1,21 @@
-//! What people set up, checked before it is stored: slugs, names, figures.
+//! What people set up or ask for, checked before it is stored: slugs, names, figures, spans.
 
 use mapfold_schema::border::Violation;
+use mapfold_schema::instant::parse_rfc3339;
 use mapfold_schema::slug::{SLUG_LENGTH_MAX, is_slug};
-use mapfold_schema::v1::{NewLevel, NewRobot, NewSite, RobotUpdate, Scope, SensorProfile};
+use mapfold_schema::v1::{
+    NewLevel, NewRevert, NewRobot, NewSite, RobotUpdate, Scope, SensorProfile,
+};
 
 use super::problem::ApiError;
+use crate::store::acts::{Span, Targets};
 
 /// Longest name for people, bytes.
 const NAME_LENGTH_MAX: usize = 128;
+/// Longest reason, bytes.
+const REASON_LENGTH_MAX: usize = 500;
+/// Contributions that a revert may name one by one.
+const NAMED_MAX: usize = 1000;
 /// Sensors of one robot.
 const SENSORS_MAX: usize = 32;
 /// Edge of a cell: from half a centimetre to a metre.
@@ -68,6 +76,14 @@ impl Findings {
         }
     }
 
+    /// An instant, if there is one and it is one.
+    fn instant(&mut self, text: Option<&str>, pointer: &str) -> Option<i64> {
+        let instant = text.and_then(parse_rfc3339);
+        let detail = "an instant as in 2026-11-22T04:00:00.123456Z";
+        self.expect(text.is_none() || instant.is_some(), pointer, "bad_instant", detail);
+        instant
+    }
+
     fn done(self) -> Result<(), ApiError> {
         if self.0.is_empty() { Ok(()) } else { Err(ApiError::Invalid(self.0)) }
     }
@@ -117,6 +133,46 @@ pub(super) fn robot_update(update: &RobotUpdate) -> Result<(), ApiError> {
         findings.expect(fine, pointer, "out_of_range", "a whole number, 0 or more");
     }
     findings.done()
+}
+
+/// A revert to be taken, or to be tried out; which contributions it means.
+pub(super) fn new_revert(new: &NewRevert, is_preview: bool) -> Result<Targets, ApiError> {
+    let NewRevert { id: _, contributions, robot, from, to, reason } = new;
+    let mut findings = Findings::default();
+    let fine = (is_preview || !reason.trim().is_empty())
+        && reason.len() <= REASON_LENGTH_MAX
+        && !reason.chars().any(char::is_control);
+    let detail = format!("say why, in 1 to {REASON_LENGTH_MAX} bytes without control characters");
+    findings.expect(fine, "/reason", "bad_reason", detail);
+    let targets = match (contributions, robot) {
+        (Some(ids), None) => {
+            findings.expect(!ids.is_empty(), "/contributions", "empty", "name one at least");
+            for (bound, pointer) in [(from, "/from"), (to, "/to")] {
+                let detail = "a span is of a robot: leave it out, or name a robot instead";
+                findings.expect(bound.is_none(), pointer, "span_without_robot", detail);
+            }
+            if ids.len() > NAMED_MAX {
+                return Err(ApiError::TooManyItems { limit: NAMED_MAX });
+            }
+            Some(Targets::Contributions(ids.clone()))
+        }
+        (None, Some(robot)) => {
+            findings.slug(robot, "/robot");
+            let from_us = findings.instant(from.as_deref(), "/from");
+            let to_us = findings.instant(to.as_deref(), "/to");
+            let fine = from_us.zip(to_us).is_none_or(|(from, to)| from < to);
+            findings.expect(fine, "/to", "empty_span", "the span must end after it begins");
+            Some(Targets::Span(Span { robot: robot.clone(), from_us, to_us }))
+        }
+        _ => {
+            let detail = "name either `contributions` or a `robot`";
+            findings.expect(false, "", "what_to_revert", detail);
+            None
+        }
+    };
+    findings.done()?;
+    // Without findings there are targets.
+    targets.ok_or_else(|| ApiError::Internal("a revert of nothing".to_owned()))
 }
 
 /// The scopes of a robot's token; reading and contributing if none are named.

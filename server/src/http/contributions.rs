@@ -15,7 +15,7 @@ use super::access::{Contribute, LevelFor, Read};
 use super::answer::{Reader, blocking, created};
 use super::body;
 use super::problem::ApiError;
-use super::query::QueryOf;
+use super::query::{QueryOf, before};
 use super::state::App;
 use crate::auth::Principal;
 use crate::level::{Accepted, SubmitError};
@@ -222,9 +222,7 @@ pub(super) async fn list(
     QueryOf(query): QueryOf<LogQuery>,
     reader: Reader,
 ) -> Result<Response, ApiError> {
-    let cursor = query.cursor.as_deref().map(str::parse::<i64>);
-    let unknown = |_| ApiError::Query("`cursor` is not one that this server gave.".to_owned());
-    let before = cursor.transpose().map_err(unknown)?;
+    let before = before(query.cursor.as_deref())?;
     let limit = query.limit.unwrap_or(PAGE);
     if !(1..=PAGE_MAX).contains(&limit) {
         return Err(ApiError::Query(format!("`limit` is 1 to {PAGE_MAX}.")));

@@ -169,6 +169,7 @@ impl Feed {
                         + patch.removed_segments.len()
                         + patch.removed_clusters.len()) as u32,
                     tiles: (patch.tiles.len() + patch.removed_tiles.len()) as u32,
+                    acts: 0,
                 }),
                 Err(_) => self.resync(),
             },
@@ -180,6 +181,7 @@ impl Feed {
                 robots: Vec::new(),
                 features: 0,
                 tiles: 0,
+                acts: 0,
             }),
         }
     }
@@ -193,7 +195,8 @@ impl Feed {
     fn resync(&mut self) -> Event {
         let revision = self.level.snapshot().folded_revision();
         self.sent = Some(revision);
-        named("resync", &LevelEvent { revision, robots: Vec::new(), features: 0, tiles: 0 })
+        let event = LevelEvent { revision, robots: Vec::new(), features: 0, tiles: 0, acts: 0 };
+        named("resync", &event)
     }
 
     /// Whether the client may still read: its token may have been revoked meanwhile.
@@ -222,7 +225,7 @@ mod tests {
     use crate::http::fixture::Fixture;
 
     fn event(revision: i64) -> LevelEvent {
-        LevelEvent { revision, robots: Vec::new(), features: 1, tiles: 1 }
+        LevelEvent { revision, robots: Vec::new(), features: 1, tiles: 1, acts: 0 }
     }
 
     /// The name and the id of an event, as they go over the line.

@@ -10,8 +10,8 @@ use utoipa::{Modify, OpenApi as _};
 use super::access::SESSION_COOKIE;
 use super::problem::ApiError;
 use super::{
-    contributions, events, exports, health, levels, patches, raster, robots, session, sites, tiles,
-    vector,
+    contributions, events, exports, health, levels, patches, raster, reverts, robots, session,
+    sites, tiles, vector,
 };
 
 /// What stands at the head of the description.
@@ -33,6 +33,7 @@ RFC 9457 problem (`application/problem+json`) with a stable `code`; where it is 
         levels::list, levels::create, levels::describe,
         robots::list, robots::enrol, robots::describe, robots::update, robots::issue_token,
         contributions::upload, contributions::list, contributions::describe,
+        reverts::create, reverts::list, reverts::describe, reverts::undo,
         vector::read, raster::changes, raster::tile, tiles::read, patches::read, events::follow,
         exports::read,
         session::sign_in, session::describe, session::sign_out,
@@ -45,7 +46,7 @@ RFC 9457 problem (`application/problem+json`) with a stable `code`; where it is 
         (name = "sites", description = "Plants or buildings: the unit of permissions"),
         (name = "levels", description = "Floors, each with a frame of its own"),
         (name = "robots", description = "Who contributes, with which sensors"),
-        (name = "contributions", description = "Uploads, and the log that they make"),
+        (name = "contributions", description = "Uploads, the log that they make, and reverts"),
         (name = "map", description = "The shared map, folded from all contributions"),
         (name = "session", description = "Signing in on the page"),
         (name = "health", description = "For those who run the server"),

@@ -5,14 +5,15 @@ use std::sync::Arc;
 
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
-use mapfold_schema::border::Violation;
+use mapfold_schema::border::{VIOLATIONS_MAX, Violation};
 use mapfold_schema::codec::{DecodeError, EncodeError};
 use mapfold_schema::problem::Problem;
 use mapfold_schema::v1::Scope;
 
 use crate::exchange::nav2::Nav2Error;
-use crate::level::{LevelError, SinceError, SubmitError};
+use crate::level::{LevelError, RevertError, SinceError, SubmitError};
 use crate::store::StoreError;
+use crate::store::acts::RevertRefusal;
 use crate::store::payload::PayloadError;
 
 /// Why a request is refused.
@@ -58,6 +59,8 @@ pub(super) enum ApiError {
     Closing,
     /// A contribution was not acknowledged.
     Submit(SubmitError),
+    /// Contributions were not taken out or put back.
+    Revert(RevertError),
     /// A revision that the map has not reached.
     Since(SinceError),
     /// A level cannot be opened.
@@ -85,6 +88,15 @@ impl From<LevelError> for ApiError {
 impl From<SinceError> for ApiError {
     fn from(error: SinceError) -> Self {
         Self::Since(error)
+    }
+}
+
+impl From<RevertError> for ApiError {
+    fn from(error: RevertError) -> Self {
+        match error {
+            RevertError::Store(error) => Self::Store(error),
+            other => Self::Revert(other),
+        }
     }
 }
 
@@ -165,6 +177,7 @@ impl ApiError {
             Self::Overloaded => of(503, "overloaded", "Too many requests at once."),
             Self::Closing => of(503, "closing", "The server is about to stop."),
             Self::Submit(error) => unacknowledged(error),
+            Self::Revert(error) => unreverted(error),
             Self::Since(error) => ahead(error),
             Self::Level(LevelError::Closing) => Self::Closing.problem(),
             Self::Level(LevelError::Store(error)) | Self::Store(error) => of_store(error),
@@ -234,6 +247,39 @@ fn unacknowledged(error: &SubmitError) -> Problem {
     }
 }
 
+fn unreverted(error: &RevertError) -> Problem {
+    let detail = error.to_string();
+    let named = |code: &str, places: &[usize], fault: &str| {
+        let violation = |place: &usize| Violation {
+            pointer: format!("/contributions/{place}"),
+            code: code.to_owned(),
+            detail: fault.to_owned(),
+        };
+        let errors: Vec<Violation> = places.iter().take(VIOLATIONS_MAX).map(violation).collect();
+        invalid(
+            &format!("contributions_{code}"),
+            &format!("{detail} Nothing has changed."),
+            &errors,
+        )
+    };
+    match error {
+        RevertError::Refused(RevertRefusal::Unknown(places)) => {
+            named("unknown", places, "this is not in the log of the level")
+        }
+        RevertError::Refused(RevertRefusal::Held(places)) => {
+            named("held", places, "this is held, and so not in the map")
+        }
+        RevertError::Refused(RevertRefusal::Nothing) => of(409, "nothing_to_revert", detail),
+        RevertError::Refused(RevertRefusal::Conflict(_)) => of(409, "revert_conflict", detail),
+        RevertError::Refused(RevertRefusal::Undone(_)) => of(409, "revert_undone", detail),
+        RevertError::Refused(RevertRefusal::TooMany(_)) => {
+            of(413, "too_many_contributions", detail)
+        }
+        RevertError::Overtaken => of(409, "map_moved_on", detail),
+        RevertError::Store(error) => of_store(error),
+    }
+}
+
 fn ahead(error: &SinceError) -> Problem {
     if error.since < 0 {
         of(400, "query_invalid", "`since` is a revision: 0 or more.")
@@ -252,7 +298,7 @@ fn of_store(error: &StoreError) -> Problem {
         }
         StoreError::Missing { kind, name } => missing(kind, name),
         StoreError::DiskFull => of(507, "storage_full", error.to_string()),
-        StoreError::ReadOnly | StoreError::Unavailable(_) => {
+        StoreError::ReadOnly | StoreError::Unavailable(_) | StoreError::Busy(_) => {
             of(503, "unavailable", "The database does not answer, or takes no changes, now.")
         }
         _ => ApiError::Internal(String::new()).problem(),

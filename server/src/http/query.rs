@@ -40,6 +40,12 @@ pub(super) struct SinceInBox {
     pub(super) bbox: Option<Bounds>,
 }
 
+/// The `cursor` of a page of the log: the revision before which it begins.
+pub(super) fn before(cursor: Option<&str>) -> Result<Option<i64>, ApiError> {
+    let unknown = |_| ApiError::Query("`cursor` is not one that this server gave.".to_owned());
+    cursor.map(str::parse::<i64>).transpose().map_err(unknown)
+}
+
 /// `min_x,min_y,max_x,max_y` in metres.
 pub(super) fn bbox<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Bounds>, D::Error> {
     let text = String::deserialize(from)?;

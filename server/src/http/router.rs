@@ -8,8 +8,8 @@ use mapfold_schema::route;
 use super::problem::ApiError;
 use super::state::App;
 use super::{
-    contributions, docs, events, exports, health, layers, levels, page, patches, raster, robots,
-    session, sites, tiles, vector,
+    contributions, docs, events, exports, health, layers, levels, page, patches, raster, reverts,
+    robots, session, sites, tiles, vector,
 };
 
 /// All routes, with all layers around them.
@@ -29,6 +29,8 @@ pub fn router(app: &App) -> Router {
                 .layer(DefaultBodyLimit::max(upload_bytes)),
         )
         .route(route::CONTRIBUTION, get(contributions::describe))
+        .route(route::REVERTS, get(reverts::list).post(reverts::create))
+        .route(route::REVERT, get(reverts::describe).delete(reverts::undo))
         .route(route::VECTOR, get(vector::read))
         .route(route::RASTER, get(raster::changes))
         .route(route::RASTER_TILE, get(raster::tile))

@@ -127,7 +127,7 @@ impl Appender {
                 self.head.fetch_max(place.revision, Ordering::AcqRel);
                 logged.push(Logged {
                     revision: place.revision,
-                    state: place.state,
+                    held: place.state == v1::ContributionState::Held,
                     contribution: Arc::clone(&accepted.checked),
                 });
             }
@@ -161,7 +161,13 @@ fn outcome(row: &NewContribution, appended: Appended) -> Result<v1::Receipt, Sub
         id: row.id,
         revision,
         received_at: to_rfc3339(received_at_us),
-        state,
+        // As it was when it was taken, so that the receipt stays the same.
+        state: match state {
+            v1::ContributionState::Held => v1::ContributionState::Held,
+            v1::ContributionState::Folded | v1::ContributionState::Reverted => {
+                v1::ContributionState::Folded
+            }
+        },
         digest: row.digest.clone(),
     };
     match appended {

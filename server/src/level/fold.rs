@@ -10,10 +10,11 @@ use tokio::time::MissedTickBehavior;
 
 use super::folding::Folding;
 use super::history::ChangeCounts;
-use super::open::{LOG_PAGE, aside};
-use super::recall::{self, Logged};
+use super::open::aside;
+use super::recall::{self, Entry, Logged};
 use super::registry::LevelOptions;
 use super::snapshot::Snapshot;
+use super::trial::{Outcome, Trial};
 use crate::clock::SharedClock;
 use crate::store::levels::LevelRow;
 use crate::store::{Store, StoreError};
@@ -27,6 +28,8 @@ pub(super) struct Folder {
     pub(super) options: LevelOptions,
     /// Rows that were appended here.
     pub(super) appended: mpsc::Receiver<Vec<Logged>>,
+    /// Acts to be tried out.
+    pub(super) trials: mpsc::Receiver<Trial>,
     /// Newest revision of the log that is known here.
     pub(super) head: Arc<AtomicI64>,
     /// Tells to look at the log now.
@@ -40,6 +43,7 @@ pub(super) struct Folder {
 struct Progress {
     changes: ChangeCounts,
     robots: BTreeSet<Arc<str>>,
+    acts: u32,
 }
 
 impl Folder {
@@ -52,6 +56,7 @@ impl Folder {
         loop {
             tokio::select! {
                 biased;
+                Some(trial) = self.trials.recv() => folding = self.try_out(folding, trial).await?,
                 appended = self.appended.recv() => match appended {
                     Some(appended) => folding = self.fold_appended(folding, appended).await?,
                     None => return Ok(()),
@@ -62,25 +67,39 @@ impl Folder {
         }
     }
 
-    /// Folds what was appended here, and before it what another replica put in between.
+    /// Folds what was appended here, and before it what others put in between.
     async fn fold_appended(
         &self,
         mut folding: Box<Folding>,
-        mut appended: Vec<Logged>,
+        appended: Vec<Logged>,
     ) -> Result<Box<Folding>, StoreError> {
-        let Some(first) = appended.first().map(|logged| logged.revision) else {
-            return Ok(folding);
-        };
-        while folding.revision() + 1 < first {
-            let page = self.read_log(folding.revision()).await?;
-            if page.is_empty() {
-                break;
+        let mut rest = appended.into_iter().map(Entry::Contribution).peekable();
+        while let Some(next) = rest.peek().map(Entry::revision) {
+            let folded = folding.revision();
+            if next <= folded {
+                // What the log gave held it already.
+                rest.next();
+            } else if next == folded + 1 {
+                let mut run = Vec::new();
+                while let Some(entry) =
+                    rest.next_if(|entry| entry.revision() == folded + 1 + run.len() as i64)
+                {
+                    run.push(entry);
+                }
+                folding = self.fold(folding, run).await?;
+            } else {
+                let between = recall::entries_after(&self.store, &self.row, folded).await?;
+                if between.is_empty() {
+                    return Err(StoreError::Corrupt {
+                        table: "contributions",
+                        key: format!("revision {}", folded + 1),
+                        detail: format!("it is not there, but {next} is"),
+                    });
+                }
+                folding = self.fold(folding, between).await?;
             }
-            folding = self.fold(folding, page).await?;
         }
-        // What the log gave may hold some of these already.
-        appended.retain(|logged| logged.revision > folding.revision());
-        self.fold(folding, appended).await
+        Ok(folding)
     }
 
     /// Folds what other replicas have appended.
@@ -96,30 +115,50 @@ impl Folder {
         let Some(revisions) = revisions else { return Ok(folding) };
         self.head.fetch_max(revisions.log, Ordering::AcqRel);
         while folding.revision() < revisions.log {
-            let page = match self.read_log(folding.revision()).await {
-                Ok(page) => page,
+            let after = folding.revision();
+            let next = match recall::entries_after(&self.store, &self.row, after).await {
+                Ok(next) => next,
                 Err(error @ StoreError::Corrupt { .. }) => return Err(error),
                 Err(_) => break,
             };
-            if page.is_empty() {
+            if next.is_empty() {
                 break;
             }
-            folding = self.fold(folding, page).await?;
+            folding = self.fold(folding, next).await?;
         }
         Ok(folding)
     }
 
-    async fn read_log(&self, after: i64) -> Result<Vec<Logged>, StoreError> {
-        let rows = self.store.log_after(&self.row.site, &self.row.level, after, LOG_PAGE).await?;
-        let target = recall::target(&self.row);
-        aside(move || rows.iter().map(|row| recall::whole(row, &target)).collect()).await
+    /// Tells what an act would change.
+    async fn try_out(
+        &self,
+        mut folding: Box<Folding>,
+        trial: Trial,
+    ) -> Result<Box<Folding>, StoreError> {
+        let Trial { kind, moved, answer } = trial;
+        // Whoever asked may have gone while others were served.
+        if answer.is_closed() {
+            return Ok(folding);
+        }
+        let (folding, outcome) = aside(move || {
+            let outcome = folding.try_out(kind, &moved, Outcome::of);
+            let outcome = outcome.map_err(|spoilt| StoreError::Corrupt {
+                table: "levels",
+                key: format!("revision {}", folding.revision()),
+                detail: spoilt.to_string(),
+            })?;
+            Ok((folding, outcome))
+        })
+        .await?;
+        let _ = answer.send(outcome.ok());
+        Ok(folding)
     }
 
     /// Folds `next`, which follows what is folded, and publishes the outcome.
     async fn fold(
         &self,
         mut folding: Box<Folding>,
-        next: Vec<Logged>,
+        next: Vec<Entry>,
     ) -> Result<Box<Folding>, StoreError> {
         if next.is_empty() {
             return Ok(folding);
@@ -127,17 +166,24 @@ impl Folder {
         let clock = Arc::clone(&self.clock);
         let (folding, progress) = aside(move || {
             let mut progress = Progress::default();
-            for logged in &next {
+            for entry in &next {
                 let started = clock.elapsed();
-                progress.changes += folding.step(logged).map_err(|gap| StoreError::Corrupt {
+                progress.changes += folding.step(entry).map_err(|stray| StoreError::Corrupt {
                     table: "contributions",
-                    key: format!("revision {}", logged.revision),
-                    detail: gap.to_string(),
+                    key: format!("revision {}", entry.revision()),
+                    detail: stray.to_string(),
                 })?;
-                if logged.in_force() {
-                    progress.robots.insert(Arc::clone(&logged.contribution.robot));
-                    let took = clock.elapsed().saturating_sub(started);
-                    metrics::histogram!("mapfold_fold_duration_seconds").record(took.as_secs_f64());
+                let took = clock.elapsed().saturating_sub(started).as_secs_f64();
+                match entry {
+                    Entry::Contribution(logged) if logged.held => {}
+                    Entry::Contribution(logged) => {
+                        progress.robots.insert(Arc::clone(&logged.contribution.robot));
+                        metrics::histogram!("mapfold_fold_duration_seconds").record(took);
+                    }
+                    Entry::Act(_) => {
+                        progress.acts += 1;
+                        metrics::histogram!("mapfold_act_duration_seconds").record(took);
+                    }
                 }
             }
             Ok((folding, progress))
@@ -163,6 +209,7 @@ impl Folder {
             robots: progress.robots.iter().map(ToString::to_string).collect(),
             features: progress.changes.features,
             tiles: progress.changes.tiles,
+            acts: progress.acts,
         });
     }
 }

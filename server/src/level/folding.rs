@@ -1,22 +1,40 @@
 //! A level's map while it is folded: the fold and its history, one revision after the other.
 //!
-//! Always one contribution at a time, in the order of the log. Any other grouping would give the
-//! same map, but not the same history: a wall that one contribution founds and the next one
+//! Always one entry at a time, in the order of the log: a contribution, or an act with all that it
+//! moves. Any other grouping would give the same map, but not the same history: a wall that one contribution founds and the next one
 //! merges into another must leave a tombstone on every replica and after every restart, because
 //! some reader may have seen it.
 
-use mapfold_map::level::{Level, LevelConfig};
+use std::collections::BTreeSet;
+
+use mapfold_map::level::{Batch, Changes, Level, LevelConfig, Misplaced};
 use mapfold_map::raster::{Tile, TileKey};
 
 use super::history::{ChangeCounts, MapHistory};
-use super::recall::Logged;
+use super::recall::{Entry, Logged};
+use crate::store::acts::ActKind;
 
-/// A revision that does not follow the last one.
+/// An entry that cannot be the next one of the log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the log goes on with revision {next} after revision {last}")]
-pub(crate) struct Gap {
-    last: i64,
-    next: i64,
+pub(crate) enum Stray {
+    /// Its revision does not follow the last one.
+    #[error("the log goes on with revision {next} after revision {last}")]
+    Gap {
+        /// Revision that is folded.
+        last: i64,
+        /// Revision of the entry.
+        next: i64,
+    },
+    /// An act takes out what is not in the map, or puts back what is.
+    #[error(
+        "the act at revision {revision} moves {misplaced:?}, which is not where it moves it from"
+    )]
+    Misplaced {
+        /// Revision of the act.
+        revision: i64,
+        /// What it moves.
+        misplaced: Misplaced,
+    },
 }
 
 /// A level's map and its history, up to one revision.
@@ -25,6 +43,8 @@ pub(crate) struct Folding {
     level: Level,
     history: MapHistory,
     revision: i64,
+    /// In the log up to there, held ones included.
+    contributions: i64,
 }
 
 impl Folding {
@@ -34,46 +54,93 @@ impl Folding {
             level: Level::new(LevelConfig::standard(resolution_m)),
             history: MapHistory::default(),
             revision: 0,
+            contributions: 0,
         }
     }
 
     /// A level at `revision`, from the tiles stored then and the contributions up to then
-    /// (without their evidence). Its history is still to be filled in.
+    /// (without their evidence), but for those whose revisions are `out`. Its history is still to
+    /// be filled in.
     pub(super) fn restored(
         resolution_m: f64,
         revision: i64,
         tiles: impl IntoIterator<Item = (TileKey, Tile)>,
         log: &[Logged],
+        out: &BTreeSet<i64>,
     ) -> Self {
-        let in_force = log.iter().filter(|logged| logged.in_force());
+        let in_force = log.iter().filter(|logged| !logged.held && !out.contains(&logged.revision));
         let level = Level::restore(
             LevelConfig::standard(resolution_m),
             tiles,
             in_force.map(|logged| &*logged.contribution),
         );
-        Self { level, history: MapHistory::default(), revision }
+        let contributions = log.len() as i64;
+        Self { level, history: MapHistory::default(), revision, contributions }
     }
 
-    /// Folds the next contribution of the log.
+    /// Folds the next entry of the log.
     ///
     /// # Errors
     /// It is not the next one; nothing has changed then.
-    pub(crate) fn step(&mut self, next: &Logged) -> Result<ChangeCounts, Gap> {
-        if next.revision != self.revision + 1 {
-            return Err(Gap { last: self.revision, next: next.revision });
+    pub(crate) fn step(&mut self, next: &Entry) -> Result<ChangeCounts, Stray> {
+        let revision = next.revision();
+        if revision != self.revision + 1 {
+            return Err(Stray::Gap { last: self.revision, next: revision });
         }
-        self.revision = next.revision;
-        if !next.in_force() {
-            return Ok(ChangeCounts::default());
-        }
-        let changes = self.level.fold([&*next.contribution]);
-        Ok(self.history.record(&changes, self.level.map(), self.revision))
+        let changes = match next {
+            Entry::Contribution(logged) => {
+                self.contributions += 1;
+                if logged.held {
+                    Changes::default()
+                } else {
+                    self.level.fold([&*logged.contribution])
+                }
+            }
+            Entry::Act(act) => move_batch(&mut self.level, act.kind, &act.moved)
+                .map_err(|misplaced| Stray::Misplaced { revision, misplaced })?,
+        };
+        self.revision = revision;
+        Ok(self.history.record(&changes, self.level.map(), revision))
+    }
+
+    /// Does what an act would do, without history, asks `look` about the outcome, and does the
+    /// opposite: both are exact, so that the map is then what it was. The map need not be copied,
+    /// which it would have to be with all that the fold remembers.
+    ///
+    /// # Errors
+    /// It cannot be done now: nothing has changed. Or, as the outer error, the map did not come
+    /// back as it was and must not be used any more.
+    pub(super) fn try_out<T>(
+        &mut self,
+        kind: ActKind,
+        moved: &Batch,
+        look: impl FnOnce(&Self, &Changes) -> T,
+    ) -> Result<Result<T, Misplaced>, Spoilt> {
+        let changes = match move_batch(&mut self.level, kind, moved) {
+            Ok(changes) => changes,
+            Err(misplaced) => return Ok(Err(misplaced)),
+        };
+        let seen = look(self, &changes);
+        let opposite = match kind {
+            ActKind::Revert => ActKind::Restore,
+            ActKind::Restore => ActKind::Revert,
+        };
+        let back = move_batch(&mut self.level, opposite, moved).map_err(|Misplaced(_)| Spoilt)?;
+        let as_before = [&changes, &back]
+            .into_iter()
+            .all(|changes| self.history.agrees(changes, self.level.map()));
+        if as_before { Ok(Ok(seen)) } else { Err(Spoilt) }
     }
 
     /// Takes revisions before `next` for contributions that are not in force: for the check of a
     /// log that has lost some.
     pub(crate) fn pass_over_until(&mut self, next: i64) {
         self.revision = self.revision.max(next - 1);
+    }
+
+    /// Contributions in the log up to there.
+    pub(crate) fn contributions(&self) -> i64 {
+        self.contributions
     }
 
     /// The revision that it has reached.
@@ -94,5 +161,17 @@ impl Folding {
     /// The same, to be filled in or put right.
     pub(super) fn history_mut(&mut self) -> &mut MapHistory {
         &mut self.history
+    }
+}
+
+/// A map that is not what its log folds to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("what was tried out could not be taken back exactly")]
+pub(super) struct Spoilt;
+
+fn move_batch(level: &mut Level, kind: ActKind, moved: &Batch) -> Result<Changes, Misplaced> {
+    match kind {
+        ActKind::Revert => level.unfold_batch(moved),
+        ActKind::Restore => level.fold_batch(moved),
     }
 }

@@ -176,6 +176,20 @@ impl MapHistory {
         }
     }
 
+    /// Whether all that `changes` names is in `map` as it is here.
+    pub(super) fn agrees(&self, changes: &Changes, map: &LevelMap) -> bool {
+        fn all<K: Least, V: PartialEq>(
+            history: &History<K, V>,
+            changed: &BTreeSet<K>,
+            map: &BTreeMap<K, Arc<V>>,
+        ) -> bool {
+            changed.iter().all(|key| history.get(key).and_then(|(_, value)| value) == map.get(key))
+        }
+        all(&self.segments, &changes.segments, &map.segments)
+            && all(&self.clusters, &changes.clusters, &map.clusters)
+            && all(&self.tiles, &changes.tiles, &map.tiles)
+    }
+
     /// The largest revision such that at most `limit` things changed after `since` and up to it,
     /// but never less than the first at which something changed; `None` if no more than `limit`
     /// changed in all.

@@ -1,7 +1,7 @@
 //! Reading a level back from the store: stored tiles and the features of its log up to the
 //! revision of those tiles, then the rest of the log.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use mapfold_map::level::FeatureId;
@@ -12,6 +12,7 @@ use super::folding::Folding;
 use super::history::{History, Least, MapHistory};
 use super::recall::{self, Logged};
 use super::rows;
+use crate::store::acts::out_after;
 use crate::store::levels::LevelRow;
 use crate::store::map_rows::{FeatureRow, MapRows, StoredMap};
 use crate::store::{Store, StoreError, tile_cells};
@@ -57,16 +58,15 @@ pub(super) async fn catch_up(
     row: &LevelRow,
     mut folding: Box<Folding>,
 ) -> Result<Box<Folding>, StoreError> {
-    let target = recall::target(row);
     loop {
-        let page = store.log_after(&row.site, &row.level, folding.revision(), LOG_PAGE).await?;
-        if page.is_empty() {
+        let entries = recall::entries_after(store, row, folding.revision()).await?;
+        if entries.is_empty() {
             return Ok(folding);
         }
         folding = aside(move || {
-            for row in &page {
-                folding.step(&recall::whole(row, &target)?).map_err(|gap| {
-                    spoilt("contributions", format!("revision {}", row.revision), gap)
+            for entry in &entries {
+                folding.step(entry).map_err(|stray| {
+                    spoilt("contributions", format!("revision {}", entry.revision()), stray)
                 })?;
             }
             Ok(folding)
@@ -100,21 +100,24 @@ async fn restore(
             .await?,
         );
     }
-    if log.len() as i64 != stored.folded_revision {
+    let acts = store.acts_between(&row.site, &row.level, 0, stored.folded_revision).await?;
+    if (log.len() + acts.len()) as i64 != stored.folded_revision {
         return Err(spoilt(
             "contributions",
             format!("revisions up to {}", stored.folded_revision),
-            format!("there are {}", log.len()),
+            format!("there are {} and {} acts", log.len(), acts.len()),
         ));
     }
     let (resolution_m, stored) = (row.resolution_m, Arc::clone(stored));
-    aside(move || Ok(restored_with_history(resolution_m, &stored, &log).map(Box::new))).await
+    let out = out_after(&acts);
+    aside(move || Ok(restored_with_history(resolution_m, &stored, &log, &out).map(Box::new))).await
 }
 
 fn restored_with_history(
     resolution_m: f64,
     stored: &StoredMap,
     log: &[Logged],
+    out: &BTreeSet<i64>,
 ) -> Result<Folding, String> {
     let mut tiles: BTreeMap<TileKey, Tile> = BTreeMap::new();
     for row in &stored.rows.tiles {
@@ -123,7 +126,7 @@ fn restored_with_history(
             tiles.insert(row.key, tile);
         }
     }
-    let mut folding = Folding::restored(resolution_m, stored.folded_revision, tiles, log);
+    let mut folding = Folding::restored(resolution_m, stored.folded_revision, tiles, log, out);
     let map = folding.level().map().clone();
     let mut history = MapHistory::default();
     for row in &stored.rows.tiles {

@@ -1,14 +1,16 @@
-//! From a row of the log back to the contribution that was folded.
+//! From rows of the log back to what was folded: contributions, and the acts between them.
 
 use std::sync::Arc;
 
-use mapfold_map::level::Contribution;
+use mapfold_map::level::{Batch, Contribution};
 use mapfold_schema::border::{Limits, Target, Violation, check_contribution};
 use mapfold_schema::v1::{self, ContributionState};
 
+use super::open::{LOG_PAGE, aside};
+use crate::store::acts::{ActKind, ActRow};
 use crate::store::log::{FeaturesRow, LogRow};
 use crate::store::payload::{self, PayloadError};
-use crate::store::{StoreError, levels::LevelRow};
+use crate::store::{Store, StoreError, levels::LevelRow};
 
 /// What stands in the log has passed the border once, perhaps under wider limits than today's.
 const NO_LIMITS: Limits = Limits {
@@ -26,17 +28,100 @@ const NO_LIMITS: Limits = Limits {
 pub(crate) struct Logged {
     /// Its place.
     pub(crate) revision: i64,
-    /// What has become of it.
-    pub(crate) state: ContributionState,
+    /// Whether it was kept out of the map when it came. One that was reverted was not: at its own
+    /// revision it was in the map.
+    pub(crate) held: bool,
     /// What it says.
     pub(crate) contribution: Arc<Contribution>,
 }
 
-impl Logged {
-    /// Whether it is in the map.
-    pub(crate) fn in_force(&self) -> bool {
-        self.state == ContributionState::Folded
+/// An act with its place in the log and all that folding it needs.
+#[derive(Debug, Clone)]
+pub(crate) struct Act {
+    /// Its place.
+    pub(crate) revision: i64,
+    /// What it does.
+    pub(crate) kind: ActKind,
+    /// The contributions that it moves.
+    pub(crate) moved: Batch,
+}
+
+/// An entry of the log.
+#[derive(Debug, Clone)]
+pub(crate) enum Entry {
+    /// A robot's.
+    Contribution(Logged),
+    /// An operator's.
+    Act(Box<Act>),
+}
+
+impl Entry {
+    /// Its place.
+    pub(crate) fn revision(&self) -> i64 {
+        match self {
+            Self::Contribution(logged) => logged.revision,
+            Self::Act(act) => act.revision,
+        }
     }
+}
+
+/// The next entries of a level's log after revision `after`; none if it has ended. An act comes
+/// alone, so that there is only one batch in memory at a time.
+///
+/// # Errors
+/// The store fails, or the log does not hold what was accepted.
+pub(crate) async fn entries_after(
+    store: &Store,
+    row: &LevelRow,
+    after: i64,
+) -> Result<Vec<Entry>, StoreError> {
+    let stretch = store.stretch_after(&row.site, &row.level, after, LOG_PAGE).await?;
+    if let Some(act) = stretch.act.filter(|_| stretch.contributions.is_empty()) {
+        return Ok(vec![Entry::Act(Box::new(gather(store, row, &act).await?))]);
+    }
+    let (rows, target) = (stretch.contributions, target(row));
+    let entry = move |row: &LogRow| whole(row, &target).map(Entry::Contribution);
+    aside(move || rows.iter().map(entry).collect()).await
+}
+
+/// Reads what an act moves, a few rows at a time.
+///
+/// # Errors
+/// The store fails, or the log does not hold what was accepted.
+pub(crate) async fn gather(store: &Store, row: &LevelRow, act: &ActRow) -> Result<Act, StoreError> {
+    let moved = batch(store, row, &act.moved).await?;
+    Ok(Act { revision: act.revision, kind: act.kind, moved })
+}
+
+/// Reads the contributions of these revisions, a few rows at a time.
+///
+/// # Errors
+/// The store fails, or the log does not hold what was accepted.
+pub(crate) async fn batch(
+    store: &Store,
+    row: &LevelRow,
+    revisions: &[i64],
+) -> Result<Batch, StoreError> {
+    let target = target(row);
+    let mut batch = Batch::default();
+    for piece in revisions.chunks(LOG_PAGE as usize) {
+        let rows = store.log_rows(&row.site, &row.level, piece).await?;
+        if rows.len() != piece.len() {
+            return Err(StoreError::Corrupt {
+                table: "acts",
+                key: format!("contributions from revision {}", piece[0]),
+                detail: format!("{} of {} are in the log", rows.len(), piece.len()),
+            });
+        }
+        batch = aside(move || {
+            for row in &rows {
+                batch.add(Arc::unwrap_or_clone(whole(row, &target)?.contribution));
+            }
+            Ok(batch)
+        })
+        .await?;
+    }
+    Ok(batch)
 }
 
 /// What the contributions of a level were checked against, but for limits.
@@ -78,5 +163,6 @@ fn logged(
             wrong.first().map(|Violation { pointer, detail, .. }| format!("{pointer}: {detail}"));
         corrupt(first.unwrap_or_else(|| "is refused".to_owned()))
     })?;
-    Ok(Logged { revision, state, contribution: Arc::new(contribution) })
+    let held = state == ContributionState::Held;
+    Ok(Logged { revision, held, contribution: Arc::new(contribution) })
 }

@@ -236,6 +236,7 @@ impl Inner {
         let (stop, look) = (Arc::new(Notify::new()), Arc::new(Notify::new()));
         let (queue, waiting) = mpsc::channel(options.queue_capacity.max(1));
         let (fold, appended) = mpsc::channel(options.fold_backlog_max.max(1));
+        let (trials, tried) = mpsc::channel(1);
         let snapshot = Arc::new(Snapshot::of(&folding, row.revision));
         let (snapshots, published) = watch::channel(snapshot);
         let events = broadcast::Sender::new(options.event_capacity.max(1));
@@ -258,6 +259,7 @@ impl Inner {
             clock: Arc::clone(&self.clock),
             options,
             appended,
+            trials: tried,
             head: Arc::clone(&head),
             look: Arc::clone(&look),
             snapshots,
@@ -300,6 +302,9 @@ impl Inner {
             events: weak_events,
             head,
             look,
+            trials,
+            store: self.store.clone(),
+            alarm: self.alarm.clone(),
         });
         Open { shared, stop, task, unused_since: None }
     }

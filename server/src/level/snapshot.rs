@@ -17,6 +17,8 @@ pub struct Snapshot {
     resolution_m: f64,
     revision: i64,
     folded_revision: i64,
+    contributions: i64,
+    in_force: i64,
     history: MapHistory,
     map: OnceLock<Arc<LevelMap>>,
     bounds: OnceLock<Option<v1::Bounds>>,
@@ -40,6 +42,8 @@ impl Snapshot {
             resolution_m: folding.level().config().resolution,
             revision: revision.max(folding.revision()),
             folded_revision: folding.revision(),
+            contributions: folding.contributions(),
+            in_force: folding.level().in_force().len() as i64,
             history: folding.history().clone(),
             map: OnceLock::new(),
             bounds: OnceLock::new(),
@@ -62,10 +66,11 @@ impl Snapshot {
         self.resolution_m
     }
 
-    /// How much there is. Every revision up to this map's is a contribution.
+    /// How much there is.
     pub fn counts(&self) -> v1::Counts {
         v1::Counts {
-            contributions: self.folded_revision,
+            contributions: self.contributions,
+            in_force: self.in_force,
             segments: self.history.segments.live_count() as i64,
             clusters: self.history.clusters.live_count() as i64,
             tiles: self.history.tiles.live_count() as i64,
@@ -158,7 +163,8 @@ fn points_bounds(points: impl Iterator<Item = Point>) -> Option<v1::Bounds> {
         .reduce(union)
 }
 
-fn union(a: v1::Bounds, b: v1::Bounds) -> v1::Bounds {
+/// The least rectangle that covers both.
+pub(super) fn union(a: v1::Bounds, b: v1::Bounds) -> v1::Bounds {
     v1::Bounds {
         min_x_m: a.min_x_m.min(b.min_x_m),
         min_y_m: a.min_y_m.min(b.min_y_m),

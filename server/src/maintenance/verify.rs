@@ -1,8 +1,10 @@
 //! Refolds a level's log from empty and compares it with what is stored.
 //!
-//! Twice, by two ways: one contribution at a time in the order of the log, which also gives the
-//! date of each thing's last change, and page by page in reverse order, which must come to the
-//! same map because the fold is a function of the set.
+//! Twice, by two ways: one entry at a time in the order of the log, which also gives the date of
+//! each thing's last change, and page by page in reverse order, without what is reverted, as if it
+//! had never been there. Both must come to the same map because the fold is a function of the set.
+
+mod acts;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -13,12 +15,14 @@ use mapfold_schema::digest::content_digest;
 use sha2::{Digest, Sha256};
 
 use crate::level::folding::Folding;
-use crate::level::recall::{self, Logged};
+use crate::level::recall::{self, Act, Entry, Logged};
 use crate::level::rows;
+use crate::store::acts::ActRow;
 use crate::store::levels::LevelRow;
 use crate::store::log::LogRow;
 use crate::store::map_rows::{FeatureRow, MapRows, StoredMap};
 use crate::store::{Store, StoreError, payload};
+use acts::Acts;
 
 /// Rows of the log that are read and folded at once.
 const PAGE: u32 = 256;
@@ -36,6 +40,10 @@ pub struct Report {
     pub folded_revision: i64,
     /// Contributions read.
     pub contributions: i64,
+    /// Those of them that are reverted.
+    pub reverted: usize,
+    /// Acts read.
+    pub acts: usize,
     /// Segments of the refolded map.
     pub segments: usize,
     /// Clusters of the refolded map.
@@ -68,26 +76,35 @@ impl Report {
 pub async fn verify(store: &Store, site: &str, level: &str) -> Result<Option<Report>, StoreError> {
     let Some(row) = store.level(site, level).await? else { return Ok(None) };
     let Some(stored) = store.stored_map(site, level).await? else { return Ok(None) };
-    let mut check = Check::new(&row, stored);
+    // What comes in meanwhile is not looked at.
+    let until = row.revision.max(stored.folded_revision);
+    let acts = store.acts_between(site, level, 0, until).await?;
+    let mut check = Check::new(&row, stored, &acts);
     for fault in store.check_file().await? {
         check.fault(format!("database file: {fault}"));
     }
     let mut after = 0;
     loop {
-        let page = store.log_after(site, level, after, PAGE).await?;
-        let Some(last) = page.last() else { break };
-        after = last.revision;
-        let run = tokio::task::spawn_blocking(move || {
-            check.fold(&page);
-            check
-        });
-        check = run.await.map_err(|panic| StoreError::Corrupt {
-            table: "contributions",
-            key: format!("revisions up to {after}"),
-            detail: format!("the fold panicked: {panic}"),
-        })?;
+        let mut stretch = store.stretch_after(site, level, after, PAGE).await?;
+        stretch.contributions.retain(|row| row.revision <= until);
+        stretch.act = stretch.act.filter(|act| act.revision <= until);
+        let Some(end) = stretch.end() else { break };
+        after = end;
+        check = check.aside(move |check| check.fold(&stretch.contributions)).await?;
+        if let Some(act) = stretch.act {
+            check = match recall::gather(store, &row, &act).await {
+                Ok(act) => check.aside(move |check| check.step_act(act)).await?,
+                Err(error @ StoreError::Corrupt { .. }) => {
+                    check.pass_over(&act, &error.to_string());
+                    check
+                }
+                Err(error) => return Err(error),
+            };
+        }
     }
-    Ok(Some(check.report(&row)))
+    check = check.catch_up(store, &row).await?;
+    let later = store.acts_between(site, level, until, i64::MAX).await?;
+    Ok(Some(check.report(&row, &later)))
 }
 
 struct Check {
@@ -95,6 +112,9 @@ struct Check {
     stored: StoredMap,
     stepwise: Folding,
     reversed: Level,
+    acts: Acts,
+    /// Revisions of rows that say of themselves what the acts do not.
+    astray: Vec<i64>,
     read: i64,
     /// Revision of the last row that was read.
     last: i64,
@@ -102,15 +122,20 @@ struct Check {
 }
 
 impl Check {
-    fn new(row: &LevelRow, stored: StoredMap) -> Self {
+    fn new(row: &LevelRow, stored: StoredMap, acts: &[ActRow]) -> Self {
+        let mut faults = Vec::new();
+        let acts = Acts::new(acts, stored.folded_revision, |fault| faults.push(fault));
+        faults.truncate(Report::FAULTS_MAX);
         let mut check = Self {
             target: recall::target(row),
             stored,
             stepwise: Folding::empty(row.resolution_m),
             reversed: Level::new(LevelConfig::standard(row.resolution_m)),
+            acts,
+            astray: Vec::new(),
             read: 0,
             last: 0,
-            faults: Vec::new(),
+            faults,
         };
         if check.stored.folded_revision == 0 {
             check.compare_stored();
@@ -134,32 +159,103 @@ impl Check {
                 // Revisions of rows that cannot be read are passed over below, as if held.
                 Err(fault) => self.fault(format!("revision {}: {fault}", row.revision)),
             }
-            if row.revision != self.last + 1 {
-                let (from, to) = (self.last + 1, row.revision - 1);
-                self.fault(format!("the log has no revision {from} (and on to {to})"));
+            if !self.acts.allow(row.revision, row.state) {
+                self.astray.push(row.revision);
             }
-            self.last = row.revision;
+            self.follow(row.revision);
         }
         // The stored map may end within the page: the ways must meet there.
         let (until, rest): (Vec<Logged>, Vec<Logged>) =
             logged.into_iter().partition(|l| l.revision <= self.stored.folded_revision);
-        for piece in [until, rest] {
+        for (piece, is_stored) in [(until, true), (rest, false)] {
             if piece.is_empty() {
                 continue;
             }
-            let in_force = piece.iter().rev().filter(|logged| logged.in_force());
+            let out = if is_stored { &self.acts.out_of_stored } else { &self.acts.out };
+            let in_force = piece.iter().rev().filter(|l| !l.held && !out.contains(&l.revision));
             self.reversed.fold(in_force.map(|logged| &*logged.contribution));
-            for logged in &piece {
-                self.stepwise.pass_over_until(logged.revision);
-                if let Err(gap) = self.stepwise.step(logged) {
-                    self.fault(gap.to_string());
-                }
+            for logged in piece {
+                self.step(&Entry::Contribution(logged));
             }
-            if self.stepwise.revision() == self.stored.folded_revision {
-                self.compare_ways();
-                self.compare_stored();
+            self.compare_here();
+        }
+    }
+
+    /// Notes that the log goes on with `revision`.
+    fn follow(&mut self, revision: i64) {
+        if revision != self.last + 1 {
+            let (from, to) = (self.last + 1, revision - 1);
+            self.fault(format!("the log has no revision {from} (and on to {to})"));
+        }
+        self.last = revision;
+    }
+
+    fn step(&mut self, entry: &Entry) {
+        self.stepwise.pass_over_until(entry.revision());
+        if let Err(stray) = self.stepwise.step(entry) {
+            self.fault(stray.to_string());
+            self.stepwise.pass_over_until(entry.revision() + 1);
+        }
+    }
+
+    /// Folds an act the way of the log; the other way knows already what is out.
+    fn step_act(&mut self, act: Act) {
+        self.follow(act.revision);
+        self.step(&Entry::Act(Box::new(act)));
+        self.compare_here();
+    }
+
+    fn pass_over(&mut self, act: &ActRow, why: &str) {
+        self.follow(act.revision);
+        self.fault(format!("revision {}: {why}", act.revision));
+        self.stepwise.pass_over_until(act.revision + 1);
+        self.compare_here();
+    }
+
+    /// Brings the second way from what was out at the stored map's revision to what is out at the
+    /// end.
+    async fn catch_up(mut self, store: &Store, row: &LevelRow) -> Result<Self, StoreError> {
+        let folded_revision = self.stored.folded_revision;
+        let Acts { out_of_stored, out, .. } = &self.acts;
+        let early = |revision: &&i64| **revision <= folded_revision;
+        let leaving: Vec<i64> = out.difference(out_of_stored).filter(early).copied().collect();
+        let coming: Vec<i64> = out_of_stored.difference(out).filter(early).copied().collect();
+        for (revisions, is_leaving) in [(leaving, true), (coming, false)] {
+            for piece in revisions.chunks(PAGE as usize) {
+                let rows = store.log_rows(&row.site, &row.level, piece).await?;
+                self = self
+                    .aside(move |check| {
+                        // What cannot be read was a fault when it was read first.
+                        let logged: Vec<Logged> =
+                            rows.iter().filter_map(|row| check.recall(row).ok()).collect();
+                        let contributions = logged.iter().map(|logged| &*logged.contribution);
+                        if is_leaving {
+                            check.reversed.unfold(contributions);
+                        } else {
+                            check.reversed.fold(contributions);
+                        }
+                    })
+                    .await?;
             }
         }
+        Ok(self)
+    }
+
+    /// Runs heavy work on a thread that may block.
+    async fn aside(
+        mut self,
+        work: impl FnOnce(&mut Self) + Send + 'static,
+    ) -> Result<Self, StoreError> {
+        let after = self.last;
+        let run = tokio::task::spawn_blocking(move || {
+            work(&mut self);
+            self
+        });
+        run.await.map_err(|panic| StoreError::Corrupt {
+            table: "contributions",
+            key: format!("revisions after {after}"),
+            detail: format!("the fold panicked: {panic}"),
+        })
     }
 
     fn recall(&self, row: &LogRow) -> Result<Logged, String> {
@@ -172,10 +268,19 @@ impl Check {
         recall::whole(row, &self.target).map_err(|e| e.to_string())
     }
 
+    fn compare_here(&mut self) {
+        if self.stepwise.revision() == self.stored.folded_revision {
+            self.compare_ways();
+            self.compare_stored();
+        }
+    }
+
     fn compare_ways(&mut self) {
         if self.stepwise.level().map() != self.reversed.map() {
             let revision = self.stepwise.revision();
-            self.fault(format!("revision {revision}: the fold depends on the order"));
+            self.fault(format!(
+                "revision {revision}: the fold depends on the order, or a revert left traces"
+            ));
         }
     }
 
@@ -219,8 +324,15 @@ impl Check {
         }
     }
 
-    fn report(mut self, row: &LevelRow) -> Report {
+    fn report(mut self, row: &LevelRow, later: &[ActRow]) -> Report {
         self.compare_ways();
+        for revision in std::mem::take(&mut self.astray) {
+            // An act that came while the log was read may have changed the row's word.
+            if !later.iter().any(|act| act.moved.binary_search(&revision).is_ok()) {
+                let is = if self.acts.out.contains(&revision) { "is" } else { "is not" };
+                self.fault(format!("revision {revision} {is} reverted, but says otherwise"));
+            }
+        }
         let revision = self.last;
         if revision < row.revision {
             self.fault(format!("the log ends at revision {revision}, not {}", row.revision));
@@ -245,6 +357,8 @@ impl Check {
             revision,
             folded_revision: self.stored.folded_revision,
             contributions: self.read,
+            reverted: self.acts.out.len(),
+            acts: self.acts.count,
             segments: map.segments.len(),
             clusters: map.clusters.len(),
             tiles: map.tiles.len(),

@@ -5,8 +5,11 @@ use mapfold_schema::v1;
 use sqlx::any::AnyRow;
 use uuid::Uuid;
 
+use super::acts::{ActRow, first_act_after};
 use super::payload::{self, Payload};
 use super::row::{corrupt, count, get};
+use super::transaction::Tx;
+use super::values::{Bulk, bulk_in};
 use super::{Store, StoreError};
 
 const TABLE: &str = "contributions";
@@ -47,6 +50,30 @@ pub struct FeaturesRow {
     /// CBOR of the contribution without its evidence.
     pub features: Vec<u8>,
 }
+
+/// The next entries of a log: contributions, and the act that follows them, if one does.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LogStretch {
+    /// Contributions, oldest first.
+    pub contributions: Vec<LogRow>,
+    /// The act after them; `None` if they are not all that comes before one.
+    pub act: Option<ActRow>,
+}
+
+impl LogStretch {
+    /// Revision of its last entry; `None` if the log has ended.
+    pub fn end(&self) -> Option<i64> {
+        let last = self.contributions.last().map(|row| row.revision);
+        self.act.as_ref().map(|act| act.revision).or(last)
+    }
+}
+
+static ROWS: Bulk = bulk_in!(
+    "select revision, state, digest, features, evidence from contributions \
+     where site = $1 and level = $2 and revision in ",
+    from 3,
+    ""
+);
 
 /// The columns that make a [`v1::ContributionEntry`].
 macro_rules! entry_columns {
@@ -150,7 +177,52 @@ impl Store {
         Ok(Some(v1::ContributionRecord { entry: entry(&row)?, digest, contribution }))
     }
 
-    /// The next rows of a level's log after revision `after`, oldest first, at most `limit`.
+    /// The next entries of a level's log after revision `after`: at most `limit` contributions, and
+    /// the act that follows them, all of one moment.
+    ///
+    /// # Errors
+    /// The store fails, or a row is spoilt.
+    pub async fn stretch_after(
+        &self,
+        site: &str,
+        level: &str,
+        after: i64,
+        limit: u32,
+    ) -> Result<LogStretch, StoreError> {
+        let mut tx = self.begin_read().await?;
+        let act = first_act_after(&mut tx, site, level, after).await?;
+        let until = act.as_ref().map_or(i64::MAX, |act| act.revision);
+        let contributions = log_rows_between(&mut tx, site, level, after, until, limit).await?;
+        tx.rollback().await?;
+        let act = act.filter(|_| contributions.len() < limit as usize);
+        Ok(LogStretch { contributions, act })
+    }
+
+    /// The rows of these revisions, in no order; one that is not there is left out.
+    ///
+    /// # Errors
+    /// The store fails, or a row is spoilt.
+    pub async fn log_rows(
+        &self,
+        site: &str,
+        level: &str,
+        revisions: &[i64],
+    ) -> Result<Vec<LogRow>, StoreError> {
+        let mut rows = Vec::with_capacity(revisions.len());
+        for (statement, piece) in ROWS.statements(revisions) {
+            let mut query = sqlx::query(statement).bind(site).bind(level);
+            for revision in piece {
+                query = query.bind(*revision);
+            }
+            for row in query.fetch_all(self.reads()).await? {
+                rows.push(log_row(&row)?);
+            }
+        }
+        Ok(rows)
+    }
+
+    /// The next contributions of a level's log after revision `after`, oldest first, at most
+    /// `limit`.
     ///
     /// # Errors
     /// The store fails, or a row is spoilt.
@@ -161,17 +233,10 @@ impl Store {
         after: i64,
         limit: u32,
     ) -> Result<Vec<LogRow>, StoreError> {
-        let rows = sqlx::query(
-            "select revision, state, digest, features, evidence from contributions \
-             where site = $1 and level = $2 and revision > $3 order by revision limit $4",
-        )
-        .bind(site)
-        .bind(level)
-        .bind(after)
-        .bind(i64::from(limit))
-        .fetch_all(self.reads())
-        .await?;
-        rows.iter().map(log_row).collect()
+        let mut tx = self.begin_read().await?;
+        let rows = log_rows_between(&mut tx, site, level, after, i64::MAX, limit).await?;
+        tx.rollback().await?;
+        Ok(rows)
     }
 
     /// The next rows of a level's log after revision `after` and up to revision `until`, oldest
@@ -208,6 +273,30 @@ impl Store {
             })
             .collect()
     }
+}
+
+/// Rows after revision `after` and before revision `until`, oldest first, at most `limit`.
+async fn log_rows_between(
+    tx: &mut Tx,
+    site: &str,
+    level: &str,
+    after: i64,
+    until: i64,
+    limit: u32,
+) -> Result<Vec<LogRow>, StoreError> {
+    let rows = sqlx::query(
+        "select revision, state, digest, features, evidence from contributions \
+         where site = $1 and level = $2 and revision > $3 and revision < $4 \
+         order by revision limit $5",
+    )
+    .bind(site)
+    .bind(level)
+    .bind(after)
+    .bind(until)
+    .bind(i64::from(limit))
+    .fetch_all(&mut **tx)
+    .await?;
+    rows.iter().map(log_row).collect()
 }
 
 pub(super) fn state_text(state: v1::ContributionState) -> &'static str {

@@ -14,7 +14,7 @@ const TABLE: &str = "robots";
 /// The columns that make a description.
 macro_rules! columns {
     () => {
-        "robot, name, sensors, state, reported_revision, queue_length, contributions, last_level, \
+        "robot, name, sensors, state, reported_revision, queue_length, contributions, reverted, last_level, \
          last_x_m, last_y_m, last_heading_rad, last_covariance, last_observed_at_us"
     };
 }
@@ -157,6 +157,7 @@ fn describe(row: &AnyRow) -> Result<v1::RobotDescription, StoreError> {
         revision: get(row, TABLE, "reported_revision")?,
         queue_length: get(row, TABLE, "queue_length")?,
         contributions: get(row, TABLE, "contributions")?,
+        reverted: get(row, TABLE, "reverted")?,
     })
 }
 

@@ -129,7 +129,19 @@ macro_rules! bulk {
     };
 }
 
-pub(super) use {bulk, with_values};
+/// A [`Bulk`] that looks for any of a list of values: `column in ($3,$4,...)`.
+macro_rules! bulk_in {
+    ($before:expr, from $first:expr, $after:expr) => {
+        $crate::store::values::Bulk([
+            $crate::store::values::with_values!($before, 1, 64, from $first, $after),
+            $crate::store::values::with_values!($before, 1, 16, from $first, $after),
+            $crate::store::values::with_values!($before, 1, 4, from $first, $after),
+            $crate::store::values::with_values!($before, 1, 1, from $first, $after),
+        ])
+    };
+}
+
+pub(super) use {bulk, bulk_in, with_values};
 
 #[cfg(test)]
 mod tests {

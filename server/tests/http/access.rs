@@ -24,6 +24,7 @@ fn table(floor: &Level, look: &Value) -> Vec<Row> {
     let level = |template: &str| floor.path(template);
     let site = |template: &str| route::of_site(template, &floor.site);
     let contribution = format!("{}/{}", level(route::CONTRIBUTIONS), look["id"].as_str().unwrap());
+    let revert = level(route::REVERT).replace("{id}", look["id"].as_str().unwrap());
     let tile = level(route::TILES).replace("{z}/{row}/{col}", "6/0/0.png");
     let cells = level(route::RASTER_TILE).replace("{x}/{y}", "0/0");
     let export = |format| level(route::EXPORTS).replace("{format}", format);
@@ -52,6 +53,21 @@ fn table(floor: &Level, look: &Value) -> Vec<Row> {
         ("GET", level(route::CONTRIBUTIONS), none.clone(), read),
         ("POST", level(route::CONTRIBUTIONS), look.clone(), [401, 201, 404, 403, 201]),
         ("GET", contribution, none.clone(), read),
+        ("GET", level(route::REVERTS), none.clone(), read),
+        (
+            "POST",
+            format!("{}?preview=true", level(route::REVERTS)),
+            json!({"robot": "r1"}),
+            [401, 403, 404, 403, 200],
+        ),
+        (
+            "POST",
+            level(route::REVERTS),
+            json!({"robot": "r3", "reason": "drift"}),
+            [401, 403, 404, 403, 409],
+        ),
+        ("GET", revert.clone(), none.clone(), [401, 404, 404, 404, 404]),
+        ("DELETE", revert, none.clone(), [401, 403, 404, 403, 404]),
         ("GET", level(route::VECTOR), none.clone(), read),
         ("GET", level(route::RASTER), none.clone(), read),
         ("GET", cells, none.clone(), read),
@@ -124,7 +140,7 @@ fn template_of(path: &str) -> String {
     }
     match parts.get(5..) {
         Some(["robots", robot, ..]) if robot.starts_with('{') => parts[6] = "{robot}",
-        Some([_, _, "contributions", _]) => parts[8] = "{id}",
+        Some([_, _, "contributions" | "reverts", _]) => parts[8] = "{id}",
         Some([_, _, "tiles", ..]) => {
             parts.splice(8.., ["{z}", "{row}", "{col}.png"]).for_each(drop);
         }

@@ -42,6 +42,8 @@ fn every_path_of_the_schema_is_described() {
         route::RASTER_TILE,
         &format!("{}.png", route::TILES),
         route::PATCHES,
+        route::REVERTS,
+        route::REVERT,
         route::EVENTS,
         route::EXPORTS,
         route::SESSION,

@@ -23,6 +23,7 @@ mod exports;
 mod layers;
 mod life;
 mod page;
+mod reverts;
 mod sessions;
 mod setup;
 mod uploads;

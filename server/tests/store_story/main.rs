@@ -20,5 +20,7 @@ mod log;
 mod maintenance;
 mod replicas;
 mod restarts;
+mod reverted_maps;
+mod reverts;
 mod setup;
 mod trust;

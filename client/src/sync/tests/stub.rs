@@ -407,6 +407,7 @@ async fn describe(State(shared): State<Shared>, headers: HeaderMap) -> Response 
 fn counts(map: &LevelMap) -> v1::Counts {
     v1::Counts {
         contributions: 0,
+        in_force: 0,
         segments: map.segments.len() as i64,
         clusters: map.clusters.len() as i64,
         tiles: map.tiles.len() as i64,
