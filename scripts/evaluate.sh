@@ -1,10 +1,12 @@
 #!/usr/bin/env bash
-# Replays every log there is through real servers on SQLite and PostgreSQL, measures the maps, and
-# rewrites the tables in BENCHMARKS.md. Logs that may not be committed are looked for in
+# Calibrates simulated scanners and measures their corrected ranges; replays every log there is
+# through real servers on SQLite and PostgreSQL and measures the maps; and rewrites the tables in
+# BENCHMARKS.md. Logs that may not be committed are looked for in
 # ../shared/data; without that folder: the committed logs and simulated worlds.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 scripts/install-rust.sh
 cargo build --release --workspace --bins
+"${CARGO_TARGET_DIR:-target}/release/mapfold-evaluate" range --report BENCHMARKS.md
 scripts/with-postgres.sh "${CARGO_TARGET_DIR:-target}/release/mapfold-evaluate" maps \
     --report BENCHMARKS.md --data ../shared/data "$@"

@@ -4,6 +4,7 @@
 //! still holds is done). 2: the command makes no sense.
 //! 130: interrupted; what waits in the outbox goes on waiting.
 
+mod calibrate;
 mod extract;
 mod mirror;
 mod progress;
@@ -19,7 +20,8 @@ use rand::rngs::StdRng;
 /// Exit status of a command that was interrupted (128 + SIGINT).
 const INTERRUPTED: u8 = 130;
 
-/// The robot's side of Mapfold: play logs, look at features, mirror maps.
+/// The robot's side of Mapfold: play logs, look at features, mirror maps, calibrate
+/// scanners.
 #[derive(Debug, Parser)]
 #[command(name = "mapfold-robot", version, propagate_version = true)]
 pub(crate) struct Arguments {
@@ -35,6 +37,9 @@ enum Command {
     Extract(extract::Extract),
     /// Keep a local copy of a level up to date.
     Mirror(mirror::MirrorLevel),
+    /// Make a scanner's profile, with a table that corrects its ranges, from readings of a flat
+    /// target; needs no server.
+    Calibrate(calibrate::Calibrate),
 }
 
 /// Runs a command.
@@ -57,6 +62,7 @@ async fn dispatch(command: Command, rng: StdRng) -> Result<ExitCode, Box<dyn std
         Command::Replay(replay) => replay.run(rng).await,
         Command::Extract(extract) => extract.run(),
         Command::Mirror(mirror) => mirror.run(rng).await,
+        Command::Calibrate(calibrate) => calibrate.run(),
     }
 }
 
@@ -105,7 +111,7 @@ impl Where {
     }
 }
 
-/// Reads `--sensor`: the name of a preset, or a TOML file.
+/// Reads `--sensor`: the name of a preset, or a file of TOML or JSON.
 fn sensors(text: &str) -> Result<mapfold_client::sensor::Sensors, String> {
     use mapfold_client::sensor::{PRESETS, Sensors, preset};
     if let Some(sensors) = preset(text) {
@@ -114,7 +120,7 @@ fn sensors(text: &str) -> Result<mapfold_client::sensor::Sensors, String> {
     let file = std::fs::read_to_string(text).map_err(|error| {
         format!("it is no preset ({}), and as a file: {error}", PRESETS.join(", "))
     })?;
-    Sensors::from_toml(&file).map_err(|error| error.to_string())
+    Sensors::parse(&file).map_err(|error| error.to_string())
 }
 
 #[cfg(test)]

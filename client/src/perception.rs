@@ -1,7 +1,7 @@
 //! From one scan to straight pieces of wall and to clusters, with honest covariances.
 //!
 //! The steps, each a module of its own: [`plausibility`] throws out what is no surface;
-//! [`points`] gives positions with covariance; [`breakpoints`] groups beams that may lie on one
+//! [`correction`] makes ranges of readings, for scanners with a table; [`points`] gives positions with covariance; [`breakpoints`] groups beams that may lie on one
 //! surface; [`split`] proposes lines by Iterative End Point Fit and confirms them by least
 //! squares; [`fit`] is the weighted total least squares behind it; [`ends`] says where and what
 //! the ends of a wall are; [`seen_through`] says where beams went through its line beside it;
@@ -12,6 +12,7 @@
 
 pub mod breakpoints;
 pub mod clusters;
+pub mod correction;
 pub mod ends;
 pub mod fit;
 pub mod plausibility;
@@ -23,6 +24,7 @@ pub mod split;
 use mapfold_map::vector::{ObservedCluster, ObservedSegment};
 
 use crate::sensor::{Scan, ScannerProfile};
+pub use correction::{Corrected, Corrector};
 pub use plausibility::BeamState;
 
 /// Every setting of extraction, one struct an algorithm.
@@ -86,14 +88,29 @@ pub struct Features {
     pub beams: Vec<BeamUse>,
 }
 
-/// Extracts the features of a scan.
+/// Extracts the features of a scan whose ranges need no correction.
 pub fn extract(scan: &Scan, config: &Config) -> Features {
     extract_plausible(scan, &plausibility::judge(scan, &config.plausibility), config)
 }
 
 /// Extracts the features of a scan whose beams have been judged.
 pub fn extract_plausible(scan: &Scan, states: &[BeamState], config: &Config) -> Features {
-    let points = points::points(scan, states, &config.noise);
+    features(scan, states, points::points(scan, states, &config.noise), config)
+}
+
+/// Extracts the features of a scan whose ranges have been corrected.
+pub fn extract_corrected(corrected: &Corrected, config: &Config) -> Features {
+    let mut points = points::points(&corrected.scan, &corrected.states, &config.noise);
+    points::with_noise(&mut points, &corrected.noise);
+    features(&corrected.scan, &corrected.states, points, config)
+}
+
+fn features(
+    scan: &Scan,
+    states: &[BeamState],
+    points: Vec<points::ScanPoint>,
+    config: &Config,
+) -> Features {
     let ring = breakpoints::Ring { closed: scan.is_full_circle(), beams: scan.ranges.len() };
     let (points, runs) =
         breakpoints::runs(points, ring, scan.geometry.increment, &config.breakpoints, &config.fit);

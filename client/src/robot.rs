@@ -128,6 +128,7 @@ pub struct Surveyor {
 struct Scanner {
     profile: ScannerProfile,
     perception: perception::Config,
+    corrector: Option<perception::Corrector>,
     evidence: ScannerEvidenceConfig,
 }
 
@@ -152,6 +153,10 @@ impl Surveyor {
             reckoning: DeadReckoning::new(config.odometry),
             scanner: scanner.map(|profile| Scanner {
                 perception: perception::Config::for_scanner(&profile),
+                corrector: perception::Corrector::for_scanner(
+                    &profile,
+                    perception::correction::CorrectionConfig::STANDARD,
+                ),
                 evidence: ScannerEvidenceConfig::STANDARD,
                 profile,
             }),

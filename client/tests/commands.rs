@@ -9,6 +9,7 @@ use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use mapfold_client::sensor::{RangeTable, Sensors};
 use server::Server;
 
 fn robot(arguments: &[&str], folder: &Path) -> Output {
@@ -59,6 +60,50 @@ fn extract_writes_the_features_of_one_scan() {
             assert!(off.abs() < 1e-3, "{off}");
         }
     }
+}
+
+#[test]
+fn calibrate_makes_a_profile_of_readings_and_says_how_good_it_is() {
+    use std::fmt::Write as _;
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = "distance_m,incidence_deg,reading_m,surface\n".to_owned();
+    for (distance, incidence) in (3..=20).flat_map(|d| [(d, 0), (d, 30), (d, 60)]) {
+        for i in 0..30 {
+            let d = 0.1 * f64::from(distance);
+            let reading = d + 0.04 * (3.0 * d).sin() + 0.0005 * f64::from(i % 15 - 7);
+            let surface = if i < 15 { "white" } else { "grey" };
+            writeln!(text, "{d:.1},{incidence},{reading:.4},{surface}").unwrap();
+        }
+    }
+    std::fs::write(folder.path().join("readings.csv"), &text).unwrap();
+    let calibrate = |readings: &str, out: &str| {
+        robot(&["calibrate", readings, "--out", out, "--model", "head 7"], folder.path())
+    };
+    for out in ["profile.toml", "profile.json"] {
+        let output = calibrate("readings.csv", out);
+        assert!(output.status.success(), "{}", words(&output));
+        let said = words(&output);
+        assert!(said.contains("readings: 1620 at 54 of 54 nodes"), "{said}");
+        assert!(said.contains("corrected:     rms 2.2 mm") && !said.contains("warning"), "{said}");
+        let written = std::fs::read_to_string(folder.path().join(out)).unwrap();
+        let scanner = Sensors::parse(&written).unwrap().scanner.unwrap();
+        assert_eq!(scanner.model, "head 7");
+        let table = RangeTable::new(scanner.correction.as_ref().unwrap());
+        let found = table.correct(1.0 + 0.04 * 3f64.sin(), 0.2).unwrap();
+        assert!((found.range - 1.0).abs() < 1e-3, "{found:?}");
+    }
+    // The profile is one that the other commands take.
+    let log = log("killian.log.gz");
+    let extract =
+        ["extract", &log, "--scan", "0", "--sensor", "profile.toml", "--out", "scan.geojson"];
+    let output = robot(&extract, folder.path());
+    assert!(output.status.success(), "{}", words(&output));
+
+    std::fs::write(folder.path().join("bad.csv"), text + "1.0,30\n").unwrap();
+    let output = calibrate("bad.csv", "none.toml");
+    assert_eq!(output.status.code(), Some(1));
+    assert!(words(&output).contains("bad.csv, line 1622: 2 cells"), "{}", words(&output));
+    assert!(!folder.path().join("none.toml").exists());
 }
 
 #[test]

@@ -3,6 +3,7 @@
 mod contribution;
 mod features;
 mod number;
+mod sensors;
 mod violations;
 mod words;
 
@@ -11,6 +12,7 @@ pub use features::{
     feature_id, map_cluster, map_patch, map_segment, map_tile, map_tile_address, parse_feature_id,
     wire_cluster, wire_patch, wire_segment, wire_tile, wire_tile_address,
 };
+pub use sensors::{check_correction, check_sensors};
 pub use violations::{VIOLATIONS_MAX, Violation};
 
 use uuid::Uuid;

@@ -8,6 +8,7 @@ mod patch;
 mod receipt;
 mod revert;
 mod robot;
+mod sensor;
 mod session;
 mod site;
 mod token;
@@ -26,9 +27,8 @@ pub use revert::{
     ChangeCounts, ChangeKind, ChangedFeature, FeatureKind, NewRevert, Revert, RevertPage,
     RevertPreview, RevertRecord, RobotShare, Undone,
 };
-pub use robot::{
-    LastPose, NewRobot, RobotDescription, RobotState, RobotUpdate, SensorKind, SensorProfile,
-};
+pub use robot::{LastPose, NewRobot, RobotDescription, RobotState, RobotUpdate};
+pub use sensor::{RangeCorrection, SensorKind, SensorMount, SensorProfile};
 pub use session::{NewSession, SessionDescription};
 pub use site::{NewSite, SiteDescription};
 pub use token::{IssuedToken, NewToken, Scope};

@@ -56,12 +56,8 @@ impl Level {
     /// The server refuses.
     pub async fn enrol(&self, robot: &str) -> Result<String, Error> {
         let scanner = SensorProfile {
-            kind: SensorKind::Scanner,
             model: "a scanner for tests".to_owned(),
-            range_max_m: 50.0,
-            range_sd_m: 0.02,
-            beam_rad: 0.005,
-            emulated: false,
+            ..SensorProfile::new(SensorKind::Scanner, 50.0, 0.02, 0.005)
         };
         let new = NewRobot { robot: robot.to_owned(), name: None, sensors: vec![scanner] };
         self.api.post_json(&route::of_site(route::ROBOTS, &self.site), &new).await?.expect(201)?;

@@ -3,7 +3,8 @@
 //!
 //! Everything here looks at Mapfold from outside: it starts `mapfold-server` and `mapfold-robot`,
 //! talks HTTP, and reads the wire types. It deliberately shares no geometry, no noise model and no
-//! log reader with the code that it checks.
+//! log reader with the code that it checks. Where a part has to be measured by itself ([`range`]),
+//! it is called as a library, and what it is measured against is still this crate's own.
 //!
 //! * [`carmen`]: reads laser logs and cuts them into parts, one for each robot of a fleet.
 //! * [`plane`], [`floor`], [`coverage`]: the merged map as plain shapes, and how well it agrees
@@ -12,6 +13,7 @@
 //! * [`programs`], [`database`], [`server`], [`robot`], [`fleet`], [`meter`], [`api`], [`level`]: the real
 //!   programs, the network between them, and what they answer.
 //! * [`trial`]: a log played as a fleet into a fresh server, and what came of it.
+//! * [`range`]: simulated heads, their calibration, and how well their ranges are corrected.
 //! * [`evaluation`], [`speed`], [`report`]: `mapfold-evaluate`, which writes tables between markers
 //!   into a page of text.
 
@@ -27,6 +29,7 @@ pub mod level;
 pub mod meter;
 pub mod plane;
 pub mod programs;
+pub mod range;
 pub mod report;
 pub mod robot;
 pub mod server;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use mapfold_tests::{evaluation, speed};
+use mapfold_tests::{evaluation, range, speed};
 
 /// Measures Mapfold and rewrites the tables of a report between their markers.
 #[derive(Debug, Parser)]
@@ -29,6 +29,12 @@ enum Command {
         #[arg(long, value_name = "TEXT")]
         only: Option<String>,
     },
+    /// Calibrates simulated infrared heads and measures how well their ranges are corrected
+    Range {
+        /// The page with the markers `range`
+        #[arg(long, value_name = "FILE")]
+        report: PathBuf,
+    },
     /// Gathers the figures that Criterion has left in the target folder
     Benches {
         /// The page with the markers `benches`
@@ -46,6 +52,7 @@ async fn main() -> ExitCode {
         Command::Maps { report, data, only } => {
             evaluation::maps(&report, data.as_deref(), only.as_deref()).await
         }
+        Command::Range { report } => range::evaluate(&report, &range::FULL),
         Command::Benches { report, criterion } => speed::benches(&report, &criterion),
     };
     match done {

@@ -3,10 +3,11 @@
 //!
 //! What is simulated: straight walls, drives with odometry that drifts, corrected poses as good as
 //! those of a good SLAM, scanners with range noise and lost returns, rings of sonars with wide
-//! cones and mirroring walls. What is not: people, slopes, motion during a scan. Chance comes from
+//! cones and mirroring walls, cheap infrared heads whose ranges err with distance and incidence. What is not: people, slopes, motion during a scan. Chance comes from
 //! the seed alone.
 
 mod drive;
+mod ir_head;
 mod noise;
 mod recorder;
 mod scanner;
@@ -14,6 +15,7 @@ mod sonar;
 mod world;
 
 pub use drive::{Odometry, Pose, Stop, drive};
+pub use ir_head::{IrBeam, IrHead, IrScanner};
 pub use noise::Noise;
 pub use recorder::{Recording, record};
 pub use scanner::Scanner;

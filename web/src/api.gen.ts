@@ -954,6 +954,26 @@ export interface components {
          * @enum {string}
          */
         Provenance: "datum" | "shared_map" | "odometry";
+        /**
+         * @description How the readings of one scanner err, measured on a flat target: reading = distance + bias +
+         *     noise, bias and noise depending on the distance and on the incidence, which is the angle between
+         *     the beam and the target's normal.
+         */
+        RangeCorrection: {
+            /** @description Mean reading less distance: a row for each incidence, in it a number for each distance. */
+            bias_m: number[][];
+            /** @description Distances of the target along the beam, ascending; at least two. */
+            distances_m: number[];
+            /**
+             * Format: double
+             * @description Readings of surfaces met at more than this are not used: at most the last incidence.
+             */
+            incidence_max_rad: number;
+            /** @description Incidences, ascending from 0 or more, below a right angle; at least one. */
+            incidences_rad: number[];
+            /** @description Standard deviation of a reading, in the same order. */
+            sd_m: number[][];
+        };
         /** @description `GET L/raster`: which tiles changed after `since`. */
         RasterChanges: {
             /** @description Tiles that hold no evidence any more. */
@@ -1208,19 +1228,42 @@ export interface components {
          * @enum {string}
          */
         SensorKind: "scanner" | "sonar";
-        /** @description One sensor of a robot, as the robot declares it. */
+        /** @description Where a sensor sits on its robot. */
+        SensorMount: {
+            /**
+             * Format: double
+             * @description Direction of the sensor's own x, counter-clockwise from straight ahead.
+             */
+            heading_rad: number;
+            /**
+             * Format: double
+             * @description Metres ahead of the robot's centre.
+             */
+            x_m: number;
+            /**
+             * Format: double
+             * @description Metres to the left of it.
+             */
+            y_m: number;
+        };
+        /**
+         * @description One sensor of a robot, as the robot declares it. What is absent is not known to the server; the
+         *     robot itself may know more.
+         */
         SensorProfile: {
             /**
              * Format: double
              * @description Standard deviation of a bearing (scanner), or full width of the cone (sonar).
              */
             beam_rad: number;
+            correction?: components["schemas"]["RangeCorrection"] | null;
             /** @description Whether its readings are derived from those of another sensor (demonstrations). */
             emulated?: boolean;
             /** @description What it is. */
             kind: components["schemas"]["SensorKind"];
             /** @description Make and model, for people. */
             model?: string;
+            mount?: components["schemas"]["SensorMount"] | null;
             /**
              * Format: double
              * @description Readings at or beyond this are no echo.
@@ -1228,9 +1271,26 @@ export interface components {
             range_max_m: number;
             /**
              * Format: double
+             * @description Nearer readings say nothing.
+             */
+            range_min_m?: number | null;
+            /**
+             * Format: double
              * @description Standard deviation of a range.
              */
             range_sd_m: number;
+            /**
+             * Format: double
+             * @description Its growth with distance.
+             */
+            range_sd_per_m?: number | null;
+            /**
+             * Format: double
+             * @description Error that all readings of one surface share, so that more readings do not average it out.
+             */
+            systematic_sd_m?: number | null;
+            /** @description Where each of its transducers sits (sonar). */
+            transducers?: components["schemas"]["SensorMount"][];
         };
         /** @description Who is signed in. */
         SessionDescription: {

@@ -6,7 +6,10 @@ use std::process::ExitCode;
 use clap::Args;
 use mapfold_client::geojson::{PlacedFeatures, feature_collection};
 use mapfold_client::log::{Observation, carmen};
-use mapfold_client::perception::{BeamUse, Config, Features, extract};
+use mapfold_client::perception::correction::CorrectionConfig;
+use mapfold_client::perception::{
+    BeamUse, Config, Corrector, Features, extract, extract_corrected, plausibility,
+};
 use mapfold_client::replay::{Competence, SensorChoice};
 use mapfold_client::sensor::Sensors;
 
@@ -19,8 +22,8 @@ pub(super) struct Extract {
     /// Only this scan, counted from 0 among the log's scans.
     #[arg(long, value_name = "N")]
     scan: Option<usize>,
-    /// The scanner: a preset (sick-lms, sick-pls, hokuyo-urg) or a TOML file; what the log tells
-    /// if absent.
+    /// The scanner: a preset (sick-lms, sick-pls, sick-lms1xx, sick-tim, hokuyo-urg, hokuyo-utm,
+    /// rplidar, ir-led) or a file of TOML or JSON; what the log tells if absent.
     #[arg(long, value_name = "FILE", value_parser = sensors)]
     sensor: Option<Sensors>,
     /// The GeoJSON file to write.
@@ -41,6 +44,14 @@ impl Extract {
         };
         let scanner = choice.choose(&log)?.scanner.ok_or("there is no profile of the scanner")?;
         let config = Config::for_scanner(&scanner);
+        let mut corrector = Corrector::for_scanner(&scanner, CorrectionConfig::STANDARD);
+        let mut features = |scan| match &mut corrector {
+            None => extract(scan, &config),
+            Some(corrector) => {
+                let states = plausibility::judge(scan, &config.plausibility);
+                extract_corrected(&corrector.correct(scan, &states), &config)
+            }
+        };
         let mut found: Vec<(u32, f64, _, Features)> = Vec::new();
         let mut count = 0;
         for reading in &log.readings {
@@ -48,7 +59,7 @@ impl Extract {
             let wanted = self.scan.is_none_or(|n| n == count);
             count += 1;
             if let (true, Some(pose)) = (wanted, reading.level_from_robot) {
-                found.push((reading.index, reading.time_s, pose, extract(scan, &config)));
+                found.push((reading.index, reading.time_s, pose, features(scan)));
             }
         }
         if found.is_empty() {

@@ -62,8 +62,10 @@ pub(super) struct Replay {
     /// Standard deviation of the log's headings, degrees.
     #[arg(long, value_name = "DEG", default_value = "0.3", value_parser = deviation)]
     heading_sd: f64,
-    /// The robot's sensors: a preset (sick-lms, sick-pls, hokuyo-urg, sonar-ring) or a TOML file;
-    /// what the log tells if absent.
+    /// The robot's sensors: a preset (sick-lms, sick-pls, sick-lms1xx, sick-tim, hokuyo-urg,
+    /// hokuyo-utm, rplidar, ir-led, sonar-ring) or a file of TOML or JSON, with the table that
+    /// `calibrate` makes if there is one; what the log tells if absent. With --create, the server
+    /// keeps it.
     #[arg(long, value_name = "FILE", value_parser = sensors)]
     sensor: Option<Sensors>,
     /// Which kinds of sensor to use; those of the log if absent.

@@ -155,7 +155,8 @@ fn best_cut(points: &[ScanPoint], members: &[usize]) -> usize {
 fn describe(points: &[ScanPoint], group: Group, config: &ClusterConfig) -> FoundCluster {
     let count = group.members.len() as f64;
     let mean = group.members.iter().map(|&i| points[i].at).sum::<Point>() / count;
-    let floor = config.systematic_sd.powi(2);
+    let shared = group.members.iter().map(|&i| points[i].variance_shared).sum::<f64>() / count;
+    let floor = config.systematic_sd.powi(2) + shared;
     let summed =
         group.members.iter().fold(Covariance::zero(), |sum, &i| sum + points[i].covariance());
     FoundCluster {

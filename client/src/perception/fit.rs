@@ -164,6 +164,7 @@ where
 
     let (mut c_rr, mut c_ra, mut c_aa) = (0.0, 0.0, 0.0);
     let (mut count, mut chi_sq, mut worst) = (0_usize, 0.0, 0.0_f64);
+    let mut shared = 0.0;
     let mut span = (f64::INFINITY, f64::NEG_INFINITY);
     for point in points {
         let d = point.at - second.centre;
@@ -180,6 +181,7 @@ where
         c_aa += through(&j_alpha, &j_alpha);
         let squared = e * e / point.variance(&normal);
         count += 1;
+        shared += point.variance_shared;
         chi_sq += squared;
         worst = worst.max(squared);
         span = (span.0.min(t + tc), span.1.max(t + tc));
@@ -188,7 +190,8 @@ where
         return Err(FitError::TooFew);
     }
     let half_length = 0.5 * (span.1 - span.0);
-    let shift = config.systematic_sd.powi(2);
+    // The variance of a mean of errors that are all alike is at most the mean of their variances.
+    let shift = config.systematic_sd.powi(2) + shared / count as f64;
     let tilt = shift / (3.0 * half_length * half_length);
     let fitted = Matrix2::new(c_rr, c_ra, c_ra, c_aa)
         + Matrix2::new(shift + tc * tc * tilt, tc * tilt, tc * tilt, tilt);

@@ -17,6 +17,10 @@ pub enum BeamState {
     Invalid,
     /// The mean of two surfaces that shared the beam (a "veil"): no surface is there.
     Mixed,
+    /// A surface met at a greater incidence than the scanner's correction is good for.
+    Oblique,
+    /// Nearer or farther than the scanner's correction was measured.
+    Uncalibrated,
 }
 
 /// When a reading is no surface.

@@ -8,6 +8,7 @@ use mapfold_map::geometry::{Covariance, Point};
 use nalgebra::Matrix2;
 
 use super::BeamState;
+use super::correction::BeamNoise;
 use crate::sensor::{Scan, ScannerProfile};
 
 /// The noise of one reading.
@@ -47,6 +48,8 @@ pub struct ScanPoint {
     pub variance_along: f64,
     /// Variance across the beam.
     pub variance_across: f64,
+    /// Variance along the beam of what its neighbours share, beyond the scanner's systematic part.
+    pub variance_shared: f64,
 }
 
 impl ScanPoint {
@@ -60,6 +63,7 @@ impl ScanPoint {
             at: direction * range,
             variance_along: range_sd_sq,
             variance_across: (range * noise.bearing_sd).powi(2),
+            variance_shared: 0.0,
         }
     }
 
@@ -91,6 +95,15 @@ pub fn points(scan: &Scan, states: &[BeamState], noise: &NoiseConfig) -> Vec<Sca
         .filter(|(_, state)| **state == BeamState::Hit)
         .map(|(beam, _)| ScanPoint::new(beam, scan.ranges[beam], scan.direction(beam), noise))
         .collect()
+}
+
+/// Gives points the noise of their own beams.
+pub fn with_noise(points: &mut [ScanPoint], noise: &[BeamNoise]) {
+    for point in points {
+        let BeamNoise { variance, shared } = noise[point.beam];
+        point.variance_along = variance;
+        point.variance_shared = shared;
+    }
 }
 
 #[cfg(test)]

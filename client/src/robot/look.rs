@@ -9,7 +9,7 @@ use super::{Scanner, Surveyor};
 use crate::emulation::{self, Chance};
 use crate::evidence::{scanner_evidence, sonar_evidence};
 use crate::log::{Observation, Reading};
-use crate::perception::{BeamState, extract_plausible, plausibility};
+use crate::perception::{BeamState, extract_corrected, extract_plausible, plausibility};
 use crate::sensor::{MountedAt, Ring, Scan};
 
 /// One contribution before it is sent.
@@ -47,11 +47,20 @@ pub(super) fn fill(surveyor: &mut Surveyor, reading: &Reading, look: &mut Contri
 
 /// Walls, clusters and evidence of a scan.
 fn see(surveyor: &mut Surveyor, scan: &Scan, look: &mut Contribution) {
-    let Some(Scanner { profile, perception, evidence }) = &surveyor.scanner else { return };
+    let Some(Scanner { profile, perception, corrector, evidence }) = &mut surveyor.scanner else {
+        return;
+    };
     let mounted = mounted(scan, &profile.mount);
     let scan = mounted.as_ref().unwrap_or(scan);
     let states = plausibility::judge(scan, &perception.plausibility);
-    let features = extract_plausible(scan, &states, perception);
+    let corrected = corrector.as_mut().map(|corrector| corrector.correct(scan, &states));
+    let (scan, states, features) = match &corrected {
+        Some(corrected) => {
+            let features = extract_corrected(corrected, perception);
+            (&corrected.scan, &corrected.states, features)
+        }
+        None => (scan, &states, extract_plausible(scan, &states, perception)),
+    };
     let usable: Vec<bool> = states.iter().map(|s| *s == BeamState::Hit).collect();
     let patch = scanner_evidence(
         scan,

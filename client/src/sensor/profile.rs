@@ -1,9 +1,11 @@
-//! Profiles: what a kind of sensor can do, read from TOML or taken from a preset.
+//! Profiles: what a sensor can do and how its readings err, as data: read from TOML or JSON, told
+//! to the server and read back from it.
 //!
 //! Every threshold of perception and evidence is derived from these few figures, so that a new
 //! sensor needs a profile and no tuning.
 
 use mapfold_map::geometry::{Pose, Robot, Sensor};
+use mapfold_schema::border::{Violation, check_correction};
 use mapfold_schema::v1;
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +25,16 @@ impl MountedAt {
     /// As a pose.
     pub fn robot_from_sensor(&self) -> Pose<Robot, Sensor> {
         Pose::new(self.x_m, self.y_m, self.heading_rad)
+    }
+
+    fn to_wire(self) -> v1::SensorMount {
+        let Self { x_m, y_m, heading_rad } = self;
+        v1::SensorMount { x_m, y_m, heading_rad }
+    }
+
+    fn from_wire(mount: &v1::SensorMount) -> Self {
+        let v1::SensorMount { x_m, y_m, heading_rad } = *mount;
+        Self { x_m, y_m, heading_rad }
     }
 }
 
@@ -49,6 +61,10 @@ pub struct ScannerProfile {
     /// Where it sits, for logs that do not tell.
     #[serde(default)]
     pub mount: MountedAt,
+    /// How the ranges of this very scanner are corrected; as they come if absent. The deviations
+    /// above are then those of corrected ranges, and this has them node by node.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub correction: Option<v1::RangeCorrection>,
 }
 
 impl ScannerProfile {
@@ -62,9 +78,15 @@ impl ScannerProfile {
         v1::SensorProfile {
             kind: v1::SensorKind::Scanner,
             model: self.model.clone(),
+            range_min_m: Some(self.range_min_m),
             range_max_m: self.range_max_m,
             range_sd_m: self.range_sd_m,
+            range_sd_per_m: Some(self.range_sd_per_m),
             beam_rad: self.bearing_sd_rad,
+            systematic_sd_m: Some(self.systematic_sd_m),
+            mount: Some(self.mount.to_wire()),
+            transducers: Vec::new(),
+            correction: self.correction.clone(),
             emulated: false,
         }
     }
@@ -104,9 +126,15 @@ impl SonarProfile {
         v1::SensorProfile {
             kind: v1::SensorKind::Sonar,
             model: self.model.clone(),
+            range_min_m: Some(self.range_min_m),
             range_max_m: self.range_max_m,
             range_sd_m: self.range_sd_m,
+            range_sd_per_m: Some(self.range_sd_per_m),
             beam_rad: self.cone_rad,
+            systematic_sd_m: None,
+            mount: None,
+            transducers: self.transducers.iter().copied().map(MountedAt::to_wire).collect(),
+            correction: None,
             emulated,
         }
     }
@@ -127,7 +155,7 @@ pub struct Sensors {
 /// A profile that cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ProfileError {
-    /// Not TOML of the expected shape.
+    /// Not TOML or JSON of the expected shape.
     #[error("the sensor file does not fit: {0}")]
     Shape(String),
     /// A figure that no sensor can have.
@@ -142,18 +170,49 @@ pub enum ProfileError {
         /// What it must be.
         rule: &'static str,
     },
+    /// A correction table that cannot be one.
+    #[error("scanner.correction{}: {}", .0.pointer, .0.detail)]
+    Correction(Violation),
     /// Neither a scanner nor a sonar.
     #[error("the sensor file names neither a [scanner] nor a [sonar]")]
     Empty,
+    /// What a server keeps of a sensor may be less than what a robot needs to know of its own.
+    #[error("what the server keeps of the {sensor} lacks {field}")]
+    Incomplete {
+        /// `scanner` or `sonar`.
+        sensor: &'static str,
+        /// What is missing.
+        field: &'static str,
+    },
 }
 
 impl Sensors {
-    /// Reads and checks a sensor file.
+    /// Reads and checks a sensor file, JSON if it begins with a brace, else TOML.
     ///
     /// # Errors
     /// What does not fit, or the first figure that no sensor can have.
-    pub fn from_toml(text: &str) -> Result<Self, ProfileError> {
-        let sensors: Self = toml::from_str(text).map_err(|e| ProfileError::Shape(e.to_string()))?;
+    pub fn parse(text: &str) -> Result<Self, ProfileError> {
+        let shape = |error: &dyn std::fmt::Display| ProfileError::Shape(error.to_string());
+        let sensors: Self = if text.trim_start().starts_with('{') {
+            serde_json::from_str(text).map_err(|e| shape(&e))?
+        } else {
+            toml::from_str(text).map_err(|e| shape(&e))?
+        };
+        sensors.check()?;
+        Ok(sensors)
+    }
+
+    /// The sensors that a server keeps of a robot, emulated ones aside; of several of one kind the
+    /// first.
+    ///
+    /// # Errors
+    /// A sensor that was declared by the least that can be said of it, or figures that no sensor
+    /// can have.
+    pub fn from_wire(declared: &[v1::SensorProfile]) -> Result<Self, ProfileError> {
+        let of = |kind| declared.iter().find(|s| s.kind == kind && !s.emulated);
+        let scanner = of(v1::SensorKind::Scanner).map(scanner_from_wire).transpose()?;
+        let sonar = of(v1::SensorKind::Sonar).map(sonar_from_wire).transpose()?;
+        let sensors = Self { scanner, sonar };
         sensors.check()?;
         Ok(sensors)
     }
@@ -170,6 +229,10 @@ impl Sensors {
             check.positive("bearing_sd_rad", s.bearing_sd_rad)?;
             check.not_negative("systematic_sd_m", s.systematic_sd_m)?;
             check.mount(&s.mount)?;
+            let wrong = s.correction.as_ref().map(check_correction).unwrap_or_default();
+            if let Some(first) = wrong.into_iter().next() {
+                return Err(ProfileError::Correction(first));
+            }
         }
         if let Some(s) = &self.sonar {
             let check = Figures("sonar");
@@ -184,6 +247,36 @@ impl Sensors {
         }
         Ok(())
     }
+}
+
+fn scanner_from_wire(s: &v1::SensorProfile) -> Result<ScannerProfile, ProfileError> {
+    let need = |field, value: Option<f64>| {
+        value.ok_or(ProfileError::Incomplete { sensor: "scanner", field })
+    };
+    Ok(ScannerProfile {
+        model: s.model.clone(),
+        range_min_m: need("range_min_m", s.range_min_m)?,
+        range_max_m: s.range_max_m,
+        range_sd_m: s.range_sd_m,
+        range_sd_per_m: s.range_sd_per_m.unwrap_or(0.0),
+        bearing_sd_rad: s.beam_rad,
+        systematic_sd_m: need("systematic_sd_m", s.systematic_sd_m)?,
+        mount: s.mount.as_ref().map(MountedAt::from_wire).unwrap_or_default(),
+        correction: s.correction.clone(),
+    })
+}
+
+fn sonar_from_wire(s: &v1::SensorProfile) -> Result<SonarProfile, ProfileError> {
+    let missing = ProfileError::Incomplete { sensor: "sonar", field: "range_min_m" };
+    Ok(SonarProfile {
+        model: s.model.clone(),
+        range_min_m: s.range_min_m.ok_or(missing)?,
+        range_max_m: s.range_max_m,
+        range_sd_m: s.range_sd_m,
+        range_sd_per_m: s.range_sd_per_m.unwrap_or(0.0),
+        cone_rad: s.beam_rad,
+        transducers: s.transducers.iter().map(MountedAt::from_wire).collect(),
+    })
 }
 
 /// The checks of one sensor's figures.
@@ -231,95 +324,17 @@ impl Figures {
     }
 }
 
-/// The names that [`preset`] knows.
-pub const PRESETS: [&str; 4] = ["sick-lms", "sick-pls", "hokuyo-urg", "sonar-ring"];
-
-/// A ready profile by name.
-///
-/// The noise figures are not the data sheets', which know neither a moving robot nor a wall that
-/// is not quite flat, but those under which long walls of real logs scatter as claimed: over
-/// eleven logs the median reduced chi-square lies between 0.3 and 0.9, so that claimed deviations
-/// are 1.05 to 1.8 times the real ones, careful and never bold (`tests/calibration.rs` repeats it
-/// on the committed log).
-pub fn preset(name: &str) -> Option<Sensors> {
-    let scanner = |scanner| Sensors { scanner: Some(scanner), sonar: None };
-    match name {
-        // SICK LMS 200/291: data sheet 5 mm statistical, 15 mm systematic up to 8 m; 80 m.
-        "sick-lms" => Some(scanner(ScannerProfile {
-            model: "SICK LMS 200".to_owned(),
-            range_min_m: 0.05,
-            range_max_m: 80.0,
-            range_sd_m: 0.01,
-            range_sd_per_m: 0.0005,
-            bearing_sd_rad: 0.1_f64.to_radians(),
-            systematic_sd_m: 0.01,
-            mount: MountedAt::default(),
-        })),
-        // SICK PLS: ranges in steps of 2.5 to 5 cm, 50 m.
-        "sick-pls" => Some(scanner(ScannerProfile {
-            model: "SICK PLS 101".to_owned(),
-            range_min_m: 0.05,
-            range_max_m: 50.0,
-            range_sd_m: 0.025,
-            range_sd_per_m: 0.002,
-            bearing_sd_rad: 0.1_f64.to_radians(),
-            systematic_sd_m: 0.015,
-            mount: MountedAt::default(),
-        })),
-        // Hokuyo URG-04LX: data sheet 1 cm below 1 m, 1 % above; 5.6 m.
-        "hokuyo-urg" => Some(scanner(ScannerProfile {
-            model: "Hokuyo URG-04LX".to_owned(),
-            range_min_m: 0.06,
-            range_max_m: 5.6,
-            range_sd_m: 0.008,
-            range_sd_per_m: 0.002,
-            bearing_sd_rad: 0.1_f64.to_radians(),
-            systematic_sd_m: 0.01,
-            mount: MountedAt::default(),
-        })),
-        // Eight Polaroid-like sonars over the front half circle, their cones just overlapping.
-        "sonar-ring" => Some(Sensors {
-            scanner: None,
-            sonar: Some(SonarProfile {
-                model: "ring of ultrasonic range finders".to_owned(),
-                range_min_m: 0.15,
-                range_max_m: 5.0,
-                range_sd_m: 0.03,
-                range_sd_per_m: 0.01,
-                cone_rad: 25f64.to_radians(),
-                transducers: (0..8u8)
-                    .map(|i| MountedAt {
-                        x_m: 0.0,
-                        y_m: 0.0,
-                        heading_rad: (-78.75 + 22.5 * f64::from(i)).to_radians(),
-                    })
-                    .collect(),
-            }),
-        }),
-        _ => None,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_preset_passes_its_own_checks_and_survives_toml() {
-        for name in PRESETS {
-            let sensors = preset(name).unwrap();
-            let text = toml::to_string(&sensors).unwrap();
-            assert_eq!(Sensors::from_toml(&text).unwrap(), sensors, "{name}");
-        }
-        assert_eq!(preset("no-such-sensor"), None);
-    }
+    use crate::sensor::preset;
 
     #[test]
     fn figures_that_no_sensor_can_have_are_named() {
         let text = "[scanner]\nrange_min_m = 0.1\nrange_max_m = 30.0\nrange_sd_m = 0.0\n\
                     bearing_sd_rad = 0.001\nsystematic_sd_m = 0.01\n";
         assert_eq!(
-            Sensors::from_toml(text),
+            Sensors::parse(text),
             Err(ProfileError::Figure {
                 sensor: "scanner",
                 field: "range_sd_m",
@@ -327,10 +342,33 @@ mod tests {
                 rule: "it must be more than 0"
             })
         );
-        assert_eq!(Sensors::from_toml(""), Err(ProfileError::Empty));
-        assert!(matches!(
-            Sensors::from_toml("[scanner]\nrange = 3.0"),
-            Err(ProfileError::Shape(_))
-        ));
+        assert_eq!(Sensors::parse(""), Err(ProfileError::Empty));
+        assert!(matches!(Sensors::parse("[scanner]\nrange = 3.0"), Err(ProfileError::Shape(_))));
+    }
+
+    #[test]
+    fn what_a_server_keeps_is_the_whole_profile() {
+        let mut scanner = preset("ir-led").and_then(|s| s.scanner).unwrap();
+        scanner.mount = MountedAt { x_m: 0.2, y_m: -0.1, heading_rad: 0.05 };
+        scanner.correction = Some(v1::RangeCorrection {
+            distances_m: vec![0.3, 4.0],
+            incidences_rad: vec![0.0, 1.2],
+            bias_m: vec![vec![0.01, -0.02]; 2],
+            sd_m: vec![vec![0.01, 0.02]; 2],
+            incidence_max_rad: 1.1,
+        });
+        let sonar = preset("sonar-ring").and_then(|s| s.sonar);
+        let sensors = Sensors { scanner: Some(scanner.clone()), sonar: sonar.clone() };
+        let wire = [scanner.to_wire(), sonar.unwrap().to_wire(false)];
+        assert_eq!(Sensors::from_wire(&wire), Ok(sensors.clone()));
+        assert_eq!(Sensors::parse(&toml::to_string(&sensors).unwrap()), Ok(sensors));
+        let bare = v1::SensorProfile::new(v1::SensorKind::Scanner, 4.0, 0.01, 0.01);
+        assert_eq!(
+            Sensors::from_wire(&[bare]),
+            Err(ProfileError::Incomplete { sensor: "scanner", field: "range_min_m" })
+        );
+        scanner.correction.as_mut().unwrap().sd_m[1][0] = -1.0;
+        let error = Sensors::from_wire(&[scanner.to_wire()]).unwrap_err().to_string();
+        assert!(error.starts_with("scanner.correction/sd_m/1/0: "), "{error}");
     }
 }

@@ -74,6 +74,11 @@ impl Violations {
         self.found.len() >= VIOLATIONS_MAX
     }
 
+    /// All that was found.
+    pub(super) fn all(self) -> Vec<Violation> {
+        self.found
+    }
+
     /// `value`, if nothing was wrong.
     pub(super) fn none_or<T>(self, value: Option<T>) -> Result<T, Vec<Violation>> {
         match value {

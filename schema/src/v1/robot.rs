@@ -3,35 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// What a sensor is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum SensorKind {
-    /// A range scanner with narrow beams.
-    Scanner,
-    /// A ring of ultrasonic range finders.
-    Sonar,
-}
-
-/// One sensor of a robot, as the robot declares it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct SensorProfile {
-    /// What it is.
-    pub kind: SensorKind,
-    /// Make and model, for people.
-    #[serde(default)]
-    pub model: String,
-    /// Readings at or beyond this are no echo.
-    pub range_max_m: f64,
-    /// Standard deviation of a range.
-    pub range_sd_m: f64,
-    /// Standard deviation of a bearing (scanner), or full width of the cone (sonar).
-    pub beam_rad: f64,
-    /// Whether its readings are derived from those of another sensor (demonstrations).
-    #[serde(default)]
-    pub emulated: bool,
-}
+use super::{SensorKind, SensorProfile};
 
 /// A robot to be enrolled.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]

@@ -1,6 +1,6 @@
 //! What people set up or ask for, checked before it is stored: slugs, names, figures, spans.
 
-use mapfold_schema::border::Violation;
+use mapfold_schema::border::{Violation, check_sensors};
 use mapfold_schema::instant::parse_rfc3339;
 use mapfold_schema::slug::{SLUG_LENGTH_MAX, is_slug};
 use mapfold_schema::v1::{
@@ -16,14 +16,10 @@ const NAME_LENGTH_MAX: usize = 128;
 const REASON_LENGTH_MAX: usize = 500;
 /// Contributions that a revert may name one by one.
 const NAMED_MAX: usize = 1000;
-/// Sensors of one robot.
-const SENSORS_MAX: usize = 32;
 /// Edge of a cell: from half a centimetre to a metre.
 const RESOLUTION_M: std::ops::RangeInclusive<f64> = 0.005..=1.0;
 /// Height of a floor over some datum.
 const ELEVATION_MAX_M: f64 = 10_000.0;
-/// Ranges of a sensor.
-const RANGE_MAX_M: f64 = 10_000.0;
 /// What a robot's token may allow: never what operators do.
 const ROBOT_SCOPES: [Scope; 2] = [Scope::MapRead, Scope::MapContribute];
 
@@ -56,24 +52,7 @@ impl Findings {
     }
 
     fn sensors(&mut self, sensors: &[SensorProfile]) {
-        let detail = format!("a robot has at most {SENSORS_MAX} sensors");
-        self.expect(sensors.len() <= SENSORS_MAX, "/sensors", "too_many", detail);
-        for (index, sensor) in sensors.iter().take(SENSORS_MAX).enumerate() {
-            let at = |field: &str| format!("/sensors/{index}/{field}");
-            let within = |value: f64, max: f64| value > 0.0 && value <= max;
-            let lengths = format!("a length of more than 0 and at most {RANGE_MAX_M} m");
-            let range = within(sensor.range_max_m, RANGE_MAX_M);
-            self.expect(range, &at("range_max_m"), "out_of_range", lengths.clone());
-            let sd = within(sensor.range_sd_m, RANGE_MAX_M);
-            self.expect(sd, &at("range_sd_m"), "out_of_range", lengths);
-            let beam = within(sensor.beam_rad, std::f64::consts::TAU);
-            let angle = "an angle of more than 0 and at most 2 pi";
-            self.expect(beam, &at("beam_rad"), "out_of_range", angle);
-            let model = sensor.model.len() <= NAME_LENGTH_MAX
-                && !sensor.model.chars().any(char::is_control);
-            let detail = format!("at most {NAME_LENGTH_MAX} bytes without control characters");
-            self.expect(model, &at("model"), "bad_name", detail);
-        }
+        self.0.extend(check_sensors(sensors));
     }
 
     /// An instant, if there is one and it is one.

@@ -3,8 +3,8 @@
 use mapfold_schema::codec::CBOR;
 use mapfold_schema::route;
 use mapfold_schema::v1::{
-    LevelDescription, NewLevel, NewRobot, NewSite, RobotDescription, RobotState, RobotUpdate,
-    SensorKind, SiteDescription,
+    LevelDescription, NewLevel, NewRobot, NewSite, RangeCorrection, RobotDescription, RobotState,
+    RobotUpdate, SensorKind, SensorMount, SensorProfile, SiteDescription,
 };
 use reqwest::Method;
 use reqwest::header::ACCEPT;
@@ -96,4 +96,56 @@ async fn bad_fields_are_named_and_nothing_is_made() {
         assert_eq!(problem.errors[0].pointer, pointer, "{body}");
     }
     assert_eq!(admin.get(route::SITES).await.data::<Vec<SiteDescription>>(), []);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_sensor_is_kept_whole_with_its_table_and_refused_place_by_place() {
+    let server = Server::start().await;
+    let admin = server.admin();
+    Level::create(&admin).await;
+    let distances_m: Vec<f64> = (3..=40).map(|i| 0.1 * f64::from(i)).collect();
+    let incidences_rad: Vec<f64> = (0..8).map(|i| f64::from(10 * i).to_radians()).collect();
+    let row = |i: usize| distances_m.iter().map(|d| 0.01 * (d + i as f64).sin()).collect();
+    let correction = RangeCorrection {
+        bias_m: (0..8).map(row).collect(),
+        sd_m: vec![vec![0.012; distances_m.len()]; 8],
+        incidence_max_rad: 65f64.to_radians(),
+        distances_m: distances_m.clone(),
+        incidences_rad,
+    };
+    let sensor = SensorProfile {
+        range_min_m: Some(0.2),
+        range_sd_per_m: Some(0.004),
+        systematic_sd_m: Some(0.01),
+        mount: Some(SensorMount { x_m: 0.1, y_m: -0.2, heading_rad: 0.3 }),
+        correction: Some(correction),
+        ..scanner()
+    };
+    let ring = SensorProfile {
+        transducers: vec![SensorMount::default(); 8],
+        ..SensorProfile::new(SensorKind::Sonar, 5.0, 0.03, 0.4)
+    };
+    let update =
+        RobotUpdate { sensors: Some(vec![sensor.clone(), ring.clone()]), ..Default::default() };
+    let path = route::robot("plant", "r1");
+    let patch = |update: &RobotUpdate| {
+        let body = serde_json::to_vec(update).unwrap();
+        let patch = admin.request(Method::PATCH, &path);
+        patch.header("content-type", "application/json").body(body)
+    };
+    let changed: RobotDescription = Answer::to(patch(&update)).await.expect(200).data();
+    assert_eq!(changed.sensors, [sensor.clone(), ring]);
+    let robots = route::of_site(route::ROBOTS, "plant");
+    let all: Vec<RobotDescription> = admin.get(&robots).await.expect(200).data();
+    assert_eq!(all[0].sensors, changed.sensors);
+
+    let mut bad = sensor;
+    bad.systematic_sd_m = Some(-0.01);
+    bad.correction.as_mut().unwrap().sd_m[3].pop();
+    let update = RobotUpdate { sensors: Some(vec![bad]), ..Default::default() };
+    let problem = Answer::to(patch(&update)).await.problem(422);
+    let pointers: Vec<_> = problem.errors.iter().map(|e| e.pointer.as_str()).collect();
+    assert_eq!(pointers, ["/sensors/0/systematic_sd_m", "/sensors/0/correction/sd_m/3"]);
+    let kept: RobotDescription = admin.get(&path).await.expect(200).data();
+    assert_eq!(kept.sensors, changed.sensors);
 }

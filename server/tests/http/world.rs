@@ -26,12 +26,8 @@ pub(crate) struct Level {
 /// A scanner.
 pub(crate) fn scanner() -> SensorProfile {
     SensorProfile {
-        kind: SensorKind::Scanner,
         model: "of tests".to_owned(),
-        range_max_m: 20.0,
-        range_sd_m: 0.02,
-        beam_rad: 0.01,
-        emulated: false,
+        ..SensorProfile::new(SensorKind::Scanner, 20.0, 0.02, 0.01)
     }
 }
 

@@ -240,12 +240,9 @@ pub(crate) fn new_robot(robot: &str) -> v1::NewRobot {
         robot: robot.to_owned(),
         name: None,
         sensors: vec![v1::SensorProfile {
-            kind,
             model: "of no make".to_owned(),
-            range_max_m: 8.0,
-            range_sd_m: 0.01,
-            beam_rad: 0.01,
             emulated: robot == "sonja",
+            ..v1::SensorProfile::new(kind, 8.0, 0.01, 0.01)
         }],
     }
 }
