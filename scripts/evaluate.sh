@@ -1,12 +1,14 @@
 #!/usr/bin/env bash
-# Calibrates simulated scanners and measures their corrected ranges; replays every log there is
-# through real servers on SQLite and PostgreSQL and measures the maps; and rewrites the tables in
-# BENCHMARKS.md. Logs that may not be committed are looked for in
-# ../shared/data; without that folder: the committed logs and simulated worlds.
+# Calibrates simulated scanners and measures their corrected ranges; compares what the maps of
+# simulated fleets claim with truth; replays every log there is through real servers on SQLite and
+# PostgreSQL and measures the maps; and rewrites the tables in BENCHMARKS.md. Logs that may not be
+# committed are looked for in ../shared/data; without that folder: the committed logs and simulated
+# worlds.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 scripts/install-rust.sh
 cargo build --release --workspace --bins
-"${CARGO_TARGET_DIR:-target}/release/mapfold-evaluate" range --report BENCHMARKS.md
-scripts/with-postgres.sh "${CARGO_TARGET_DIR:-target}/release/mapfold-evaluate" maps \
-    --report BENCHMARKS.md --data ../shared/data "$@"
+evaluate="${CARGO_TARGET_DIR:-target}/release/mapfold-evaluate"
+"$evaluate" range --report BENCHMARKS.md
+"$evaluate" honesty --report BENCHMARKS.md
+scripts/with-postgres.sh "$evaluate" maps --report BENCHMARKS.md --data ../shared/data "$@"

@@ -3,13 +3,14 @@
 //!
 //! Everything here looks at Mapfold from outside: it starts `mapfold-server` and `mapfold-robot`,
 //! talks HTTP, and reads the wire types. It deliberately shares no geometry, no noise model and no
-//! log reader with the code that it checks. Where a part has to be measured by itself ([`range`]),
-//! it is called as a library, and what it is measured against is still this crate's own.
+//! log reader with the code that it checks. Where a part has to be measured by itself ([`range`],
+//! [`honesty`]), it is called as a library, and what it is measured against is still this crate's own.
 //!
 //! * [`carmen`]: reads laser logs and cuts them into parts, one for each robot of a fleet.
 //! * [`plane`], [`floor`], [`coverage`]: the merged map as plain shapes, and how well it agrees
 //!   with the readings that it was made of.
 //! * [`simulation`]: worlds of walls, drives through them with odometry noise, scanners, sonars.
+//! * [`honesty`]: what maps claim against how wrong they are.
 //! * [`programs`], [`database`], [`server`], [`robot`], [`fleet`], [`meter`], [`api`], [`level`]: the real
 //!   programs, the network between them, and what they answer.
 //! * [`trial`]: a log played as a fleet into a fresh server, and what came of it.
@@ -25,6 +26,7 @@ pub mod error;
 pub mod evaluation;
 pub mod fleet;
 pub mod floor;
+pub mod honesty;
 pub mod level;
 pub mod meter;
 pub mod plane;

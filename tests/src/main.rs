@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use mapfold_tests::{evaluation, range, speed};
+use mapfold_tests::{evaluation, honesty, range, speed};
 
 /// Measures Mapfold and rewrites the tables of a report between their markers.
 #[derive(Debug, Parser)]
@@ -35,6 +35,13 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         report: PathBuf,
     },
+    /// Sends simulated fleets that localize on the map that they write, and compares what it claims
+    /// with how wrong it is
+    Honesty {
+        /// The page with the markers `honesty`
+        #[arg(long, value_name = "FILE")]
+        report: PathBuf,
+    },
     /// Gathers the figures that Criterion has left in the target folder
     Benches {
         /// The page with the markers `benches`
@@ -53,6 +60,7 @@ async fn main() -> ExitCode {
             evaluation::maps(&report, data.as_deref(), only.as_deref()).await
         }
         Command::Range { report } => range::evaluate(&report, &range::FULL),
+        Command::Honesty { report } => honesty::table(&report),
         Command::Benches { report, criterion } => speed::benches(&report, &criterion),
     };
     match done {

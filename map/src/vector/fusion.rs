@@ -47,18 +47,29 @@ fn inverse(m: &Matrix2<f64>) -> Option<Matrix2<f64>> {
 /// Fuses sightings of one wall (canonical order), angles being counted from `reference`.
 /// `None` if no sighting carries information.
 pub(super) fn fuse<'a>(
-    sightings: impl Iterator<Item = (FeatureId, &'a Sighting)>,
+    sightings: impl Iterator<Item = (FeatureId, &'a Sighting)> + Clone,
     reference: &Sighting,
     config: &VectorConfig,
 ) -> Option<FusedLine> {
     let anchor = reference.middle;
+    // Once somebody has localized on the map, the error of a fix on surveyed landmarks that is in it
+    // may be in other poses too.
+    let fixes_are_own = sightings.clone().all(|(_, s)| s.is_datum);
     let looks = one_per_look(sightings.map(|(id, s)| {
         let (offset, lever) = s.offset_about(&anchor);
+        let (r, p) = if fixes_are_own {
+            (s.independent + s.own_fix, s.dependent)
+        } else {
+            (
+                s.independent * (1.0 - config.fed_back),
+                s.dependent + s.own_fix + s.independent * config.fed_back,
+            )
+        };
         Estimate {
             look: id.contribution,
             z: Vector2::new(offset, difference(s.alpha, reference.alpha)),
-            r: about(&s.independent, lever),
-            p: about(&s.dependent, lever),
+            r: about(&r, lever),
+            p: about(&p, lever),
         }
     }));
     let weights: Vec<f64> =

@@ -21,10 +21,15 @@ pub(super) struct Sighting {
     pub(super) ends: [ObservedEnd; 2],
     /// Variance of the middle's place along the line from the pose's error, square metres.
     along_variance: f64,
-    /// Covariance of (offset, alpha) from errors of this look alone.
+    /// Covariance of (offset, alpha) from the sensor's errors in this look alone.
     pub(super) independent: Matrix2<f64>,
+    /// Covariance of (offset, alpha) from the errors of this look's own fix on surveyed landmarks:
+    /// its own as long as nobody has localized on the map that it is in.
+    pub(super) own_fix: Matrix2<f64>,
     /// Covariance of (offset, alpha) from errors that other looks may share.
     pub(super) dependent: Matrix2<f64>,
+    /// Whether the pose was found on surveyed landmarks only.
+    pub(super) is_datum: bool,
     pub(super) robot: RobotName,
     pub(super) observed_at_us: i64,
     merit: f64,
@@ -61,11 +66,12 @@ impl Sighting {
         let j_offset_line = Matrix2::new(1.0, -along, 0.0, 1.0);
         let j_offset_pose = Matrix2x3::new(normal.x, normal.y, -along, 0.0, 0.0, 1.0);
         let by_pose = |c: &Covariance<3>| *c.transformed(&j_offset_pose).matrix();
-        let mut independent = *segment.line.covariance.transformed(&j_offset_line).matrix();
+        let independent = *segment.line.covariance.transformed(&j_offset_line).matrix();
         let level_covariance = &look.level_from_robot.covariance;
         let mut dependent = by_pose(level_covariance);
+        let mut own_fix = Matrix2::zeros();
         if look.provenance == Provenance::Datum {
-            independent += dependent;
+            own_fix = dependent;
             let position = config.datum_position_sd * config.datum_position_sd;
             let heading = config.datum_heading_sd * config.datum_heading_sd;
             dependent = by_pose(&Covariance::from_variances([position, position, heading]));
@@ -83,7 +89,9 @@ impl Sighting {
             ends: segment.ends,
             along_variance: along_pose.matrix()[(0, 0)],
             independent,
+            own_fix,
             dependent,
+            is_datum: look.provenance == Provenance::Datum,
             robot: look.robot.clone(),
             observed_at_us: look.observed_at_us,
             merit: 0.0,
@@ -91,8 +99,8 @@ impl Sighting {
         if segment.facing == Facing::Origin {
             sighting.turn_round();
         }
-        let total = sighting.independent + sighting.dependent;
-        sighting.merit = 2.0 * sighting.half_length / (1.0 + scaled_trace(&total, config)).sqrt();
+        sighting.merit =
+            2.0 * sighting.half_length / (1.0 + scaled_trace(&sighting.total(), config)).sqrt();
         sighting
     }
 
@@ -105,7 +113,13 @@ impl Sighting {
         self.tangent = -self.tangent;
         self.ends.swap(0, 1);
         self.independent = flip * self.independent * flip;
+        self.own_fix = flip * self.own_fix * flip;
         self.dependent = flip * self.dependent * flip;
+    }
+
+    /// Covariance of (offset, alpha) from all errors.
+    fn total(&self) -> Matrix2<f64> {
+        self.independent + self.own_fix + self.dependent
     }
 
     /// The two ends in the level frame, in the order of `ends`.
@@ -174,9 +188,7 @@ impl Groupable for Sighting {
             0.0,
             config.angle_noise * config.angle_noise,
         );
-        let s = about(&(self.independent + self.dependent), -at)
-            + about(&(follower.independent + follower.dependent), lever)
-            + noise;
+        let s = about(&self.total(), -at) + about(&follower.total(), lever) + noise;
         let determinant = s.determinant();
         if determinant <= 0.0 {
             return None;

@@ -49,9 +49,7 @@ impl Classical {
             let (error, covariance) = (*state)?;
             let middle = wall.middle();
             let angle = wrap(wall.angle + error.y);
-            let offset = unit_normal(wall.angle).dot(&middle) + error.x
-                - unit_normal(wall.angle).dot(&middle)
-                + unit_normal(angle).dot(&middle);
+            let offset = error.x + unit_normal(angle).dot(&middle);
             let lever = tangent(angle).dot(&middle);
             let j = Matrix2::new(1.0, lever, 0.0, 1.0);
             let covariance = j * covariance * j.transpose();
@@ -95,6 +93,6 @@ fn about_middle(
     let local = believed.inverse().act(&middle);
     let offset = unit_normal(line.alpha()).dot(&local) - line.rho();
     let j = Matrix2::new(-1.0, tangent(line.alpha()).dot(&local), 0.0, 1.0);
-    let z = Vector2::new(-offset, difference(angle, wall.angle));
+    let z = Vector2::new(offset, difference(angle, wall.angle));
     (z, j * segment.line.covariance.matrix() * j.transpose())
 }

@@ -5,8 +5,8 @@
 //! as large as it is on the worst of the lines that were used.
 
 use mapfold_map::geometry::{
-    Covariance, Level, Pose, Robot, UncertainPose, difference, mahalanobis_sq, tangent, unit_normal,
-    wrap,
+    Covariance, Level, Pose, Robot, UncertainPose, difference, mahalanobis_sq, tangent,
+    unit_normal, wrap,
 };
 use mapfold_map::level::LevelMap;
 use mapfold_map::vector::{Facing, ObservedSegment};
@@ -103,12 +103,29 @@ pub(super) fn fix(
         found = Some(covariance);
     }
     let covariance = found?;
+    // A wrong pairing shows in what is left over.
+    if pairs.iter().any(|(line, seen)| left_over(line, seen, &pose).is_none_or(|d| d > LEFT_MAX)) {
+        return None;
+    }
     // Parallel walls alone leave one direction open.
     let worst = covariance[(0, 0)].max(covariance[(1, 1)]).sqrt();
     if worst > 0.3 {
         return None;
     }
     Some(UncertainPose { pose, covariance: Covariance::new(covariance).ok()? })
+}
+
+/// 99.9 % of chi-square with two degrees of freedom.
+const LEFT_MAX: f64 = 13.82;
+
+/// The squared Mahalanobis distance of an observed line from where a pose would have it.
+fn left_over(line: &MapLine, seen: &ObservedSegment, pose: &Pose<Level, Robot>) -> Option<f64> {
+    let expected = line.seen_from(pose)?;
+    let j = expected.j_line();
+    let residual = expected.residual(seen);
+    let spread =
+        seen.line.covariance.matrix() + j * (line.independent + line.dependent) * j.transpose();
+    Some((residual.transpose() * spread.try_inverse()? * residual)[(0, 0)])
 }
 
 fn pair<'a>(

@@ -117,8 +117,7 @@ impl Room {
         })?;
         let at = wall.middle();
         let delta = Vector2::new(
-            offset - unit_normal(angle).dot(&at)
-                - (wall.offset - unit_normal(wall.angle).dot(&at)),
+            offset - unit_normal(angle).dot(&at) - (wall.offset - unit_normal(wall.angle).dot(&at)),
             difference(angle, wall.angle),
         );
         // Moved from the level's origin to the wall's middle, in the published normal form.
