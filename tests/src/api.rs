@@ -131,6 +131,14 @@ impl Api {
         self.post(path, JSON, body).await
     }
 
+    /// `DELETE`.
+    ///
+    /// # Errors
+    /// No answer.
+    pub async fn delete(&self, path: &str) -> Result<Answer, Error> {
+        self.send(Method::DELETE, path, JSON, None).await
+    }
+
     async fn send(
         &self,
         method: Method,

@@ -7,8 +7,8 @@ use mapfold_schema::codec::JSON;
 use mapfold_schema::route;
 use mapfold_schema::v1::{
     Cluster, ContributionEntry, ContributionPage, ContributionRecord, IssuedToken,
-    LevelDescription, NewLevel, NewRobot, NewSite, Patch, RasterChanges, Segment, SensorKind,
-    SensorProfile, TileAddress, TileEvidence, VectorPatch,
+    LevelDescription, NewLevel, NewRevert, NewRobot, NewSite, Patch, RasterChanges, Revert,
+    Segment, SensorKind, SensorProfile, TileAddress, TileEvidence, VectorPatch,
 };
 use uuid::Uuid;
 
@@ -121,6 +121,23 @@ impl Level {
     pub async fn contribution(&self, id: Uuid) -> Result<ContributionRecord, Error> {
         let path = self.path(route::CONTRIBUTION).replace("{id}", &id.to_string());
         self.api.fetch(&path).await
+    }
+
+    /// Takes contributions out of the map.
+    ///
+    /// # Errors
+    /// No answer, or a refusal.
+    pub async fn revert(&self, revert: &NewRevert) -> Result<Revert, Error> {
+        self.api.post_json(&self.path(route::REVERTS), revert).await?.expect(201)?.decode()
+    }
+
+    /// Puts them back.
+    ///
+    /// # Errors
+    /// No answer, or a refusal.
+    pub async fn undo(&self, revert: Uuid) -> Result<Revert, Error> {
+        let path = self.path(route::REVERT).replace("{id}", &revert.to_string());
+        self.api.delete(&path).await?.expect(200)?.decode()
     }
 
     /// An export's bytes.

@@ -6,8 +6,12 @@ import type { Evidence, PictureAddress } from "./pyramid";
 import type {
   ContributionPage,
   LevelDescription,
+  NewRevert,
   Problem,
   RasterChanges,
+  Revert,
+  RevertPage,
+  RevertPreview,
   RobotDescription,
   SessionDescription,
   SiteDescription,
@@ -49,7 +53,20 @@ export interface Api {
   sites: () => Promise<SiteDescription[]>;
   level: (place: Place, signal: AbortSignal) => Promise<LevelDescription>;
   robots: (place: Place, signal: AbortSignal) => Promise<RobotDescription[]>;
-  contributions: (place: Place, options: { limit: number; robot?: string }, signal: AbortSignal) => Promise<ContributionPage>;
+  contributions: (
+    place: Place,
+    options: { limit: number; robot?: string; cursor?: string },
+    signal: AbortSignal,
+  ) => Promise<ContributionPage>;
+  /** The newest reverts. */
+  reverts: (place: Place, signal: AbortSignal) => Promise<RevertPage>;
+  /** Takes contributions out of the map. */
+  revert: (place: Place, revert: NewRevert) => Promise<Revert>;
+  /** Puts them back. */
+  undoRevert: (place: Place, id: string) => Promise<Revert>;
+  /** What either would change. */
+  previewRevert: (place: Place, revert: NewRevert, signal: AbortSignal) => Promise<RevertPreview>;
+  previewUndo: (place: Place, id: string, signal: AbortSignal) => Promise<RevertPreview>;
   vector: (place: Place, since: number, signal: AbortSignal) => Promise<VectorPatch>;
   raster: (place: Place, since: number, signal: AbortSignal) => Promise<RasterChanges>;
   /** One picture of the raster; null where there is nothing to see. */
@@ -79,6 +96,10 @@ export function inWords(error: unknown): string {
 /** Whether the work was called off. */
 export function isAborted(error: unknown): boolean {
   return error instanceof DOMException && error.name === "AbortError";
+}
+
+function posted(body: object): RequestInit {
+  return { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) };
 }
 
 async function problemOf(response: Response): Promise<Problem | null> {
@@ -123,11 +144,7 @@ export function createApi(browser: Browser): Api {
   return {
     nowMs: () => browser.nowMs() + serverAheadMs,
     signIn: (token) =>
-      askJson("/api/v1/session", {
-        method: "POST",
-        headers: { "content-type": "application/json" },
-        body: JSON.stringify({ token }),
-      }),
+      askJson("/api/v1/session", posted({ token })),
     signOut: async () => {
       await ask("/api/v1/session", { method: "DELETE" });
     },
@@ -142,10 +159,18 @@ export function createApi(browser: Browser): Api {
     sites: () => askJson("/api/v1/sites"),
     level: (place, signal) => askJson(levelPath(place), { signal }),
     robots: (place, signal) => askJson(`/api/v1/sites/${encodeURIComponent(place.site)}/robots`, { signal }),
-    contributions: (place, { limit, robot }, signal) => {
+    contributions: (place, { limit, robot, cursor }, signal) => {
       const filter = robot === undefined ? "" : `&robot=${encodeURIComponent(robot)}`;
-      return askJson(`${levelPath(place)}/contributions?limit=${limit}${filter}`, { signal });
+      const from = cursor === undefined ? "" : `&cursor=${encodeURIComponent(cursor)}`;
+      return askJson(`${levelPath(place)}/contributions?limit=${limit}${filter}${from}`, { signal });
     },
+    reverts: (place, signal) => askJson(`${levelPath(place)}/reverts`, { signal }),
+    revert: (place, revert) => askJson(`${levelPath(place)}/reverts`, posted(revert)),
+    undoRevert: (place, id) => askJson(`${levelPath(place)}/reverts/${encodeURIComponent(id)}`, { method: "DELETE" }),
+    previewRevert: (place, revert, signal) =>
+      askJson(`${levelPath(place)}/reverts?preview=true`, { ...posted(revert), signal }),
+    previewUndo: (place, id, signal) =>
+      askJson(`${levelPath(place)}/reverts/${encodeURIComponent(id)}?preview=true`, { method: "DELETE", signal }),
     vector: (place, since, signal) => askJson(`${levelPath(place)}/vector?since=${since}`, { signal }),
     raster: (place, since, signal) => askJson(`${levelPath(place)}/raster?since=${since}`, { signal }),
     picture: async (place, picture, evidence) => {

@@ -11,6 +11,7 @@ import { createContributionsCard } from "./panels/contributions_card";
 import { createHeader } from "./panels/header";
 import { createLayersCard } from "./panels/layers_card";
 import { createLevelCard } from "./panels/level_card";
+import { createLogPanel } from "./panels/log_panel";
 import { createMapTools, ZOOM_STEP } from "./panels/map_tools";
 import { createMessages } from "./panels/messages";
 import { createRobotsCard } from "./panels/robots_card";
@@ -18,9 +19,11 @@ import { createSelectionCard } from "./panels/selection_card";
 import { createSignIn } from "./panels/sign_in";
 import { formatPermalink, parsePermalink, takeToken } from "./permalink";
 import { pick } from "./pick";
+import { createLogActions } from "./reverting";
 import { resume, signIn, signOut } from "./session";
 import { initialState, samePlace } from "./state";
 import { createStore } from "./store";
+import { uuidFrom } from "./uuid";
 
 /** How often the ages on the page are brought up to date. */
 const TICK_MS = 5_000;
@@ -64,14 +67,17 @@ const map = createMapView({
 });
 
 // The panels.
+const page = byId("page");
 const panels = byId("panels");
 const overMap = byId("over-map");
+const log = createLogActions({ api, state: store.state, dispatch, uuid: () => uuidFrom(crypto.getRandomValues(new Uint8Array(16))) });
 const draws = [
   createHeader({ parent: byId("header"), store, onSignOut: () => void signOut(api, dispatch) }),
   createLevelCard(panels),
   createRobotsCard(panels, { store, theme }),
   createLayersCard(panels, store),
-  createContributionsCard(panels, { store, theme }),
+  createContributionsCard(panels, { store, theme, onOpenLog: log.open }),
+  createLogPanel({ parent: page, store, theme, actions: log }),
   createSelectionCard(overMap, store),
   createMapTools({ parent: overMap, store, onZoom: map.zoomBy }),
   createMessages(overMap, window.location.origin),
@@ -83,10 +89,10 @@ const draws = [
   map.draw,
   facts.drawn,
 ];
-const page = byId("page");
 store.onFrame((state) => {
   setShown(page, state.session.kind === "in");
   page.classList.toggle("panels-open", state.panelsOpen);
+  page.classList.toggle("log-open", state.log.open);
   for (const draw of draws) draw(state);
 });
 darkScheme.addEventListener("change", () => {
@@ -113,6 +119,9 @@ store.onChange((state, before) => {
           });
   }
 });
+store.onChange((state, before) => {
+  if (state.log.open && before.contributions !== state.contributions) log.refresh();
+});
 store.onChange((state) => {
   if (state.session.kind !== "in" || state.place === null) return;
   const hash = formatPermalink(state);
@@ -127,7 +136,7 @@ window.addEventListener("hashchange", () => {
 // Keys, while nobody types.
 document.addEventListener("keydown", (event) => {
   const typing = event.target instanceof Element && event.target.closest("input, select, textarea") !== null;
-  if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
+  if ((typing && event.key !== "Escape") || event.ctrlKey || event.metaKey || event.altKey) return;
   const state = store.state();
   switch (event.key) {
     case "f":
@@ -142,7 +151,8 @@ document.addEventListener("keydown", (event) => {
       if (document.activeElement !== stage) map.zoomBy(event.key === "+" ? ZOOM_STEP : 1 / ZOOM_STEP);
       break;
     case "Escape":
-      dispatch({ kind: "select", selection: null });
+      if (state.log.open) log.close();
+      else dispatch({ kind: "select", selection: null });
       break;
     case "Enter":
       if (document.activeElement === stage) {

@@ -6,6 +6,7 @@ import type { LayerName, Layers, LayerSetting } from "./layers";
 import { withSlots } from "./palette";
 import type { Permalink, Place, View } from "./permalink";
 import type { Evidence } from "./pyramid";
+import { NO_LOG, type LogState } from "./reverts";
 import type {
   ContributionEntry,
   LastPose,
@@ -56,6 +57,7 @@ export interface State {
   slots: ReadonlyMap<string, number>;
   /** The newest ones; null until they are known. */
   contributions: readonly ContributionEntry[] | null;
+  log: LogState;
   link: Link;
   layers: Layers;
   evidence: Evidence;
@@ -80,6 +82,7 @@ export type Event =
   | { kind: "raster"; changes: RasterChanges }
   | { kind: "robots"; robots: readonly RobotDescription[] }
   | { kind: "contributions"; contributions: readonly ContributionEntry[] }
+  | { kind: "log"; log: Partial<LogState> }
   | { kind: "heard"; robots: readonly string[]; atMs: number }
   | { kind: "link"; link: Link }
   | { kind: "layer"; name: LayerName; setting: Partial<LayerSetting> }
@@ -101,6 +104,7 @@ const NO_LEVEL = {
   heardAtMs: new Map<string, number>(),
   slots: new Map<string, number>(),
   contributions: null,
+  log: NO_LOG,
   link: { kind: "idle" },
   selection: null,
   pointer: null,
@@ -159,6 +163,8 @@ export function update(state: State, event: Event): State {
           state.heardAtMs,
         ),
       };
+    case "log":
+      return { ...state, log: { ...state.log, ...event.log } };
     case "heard":
       return { ...state, heardAtMs: withHeard(state.heardAtMs, event.robots, event.atMs) };
     case "link":

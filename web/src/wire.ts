@@ -42,3 +42,10 @@ export type RobotDescription = Exactly<Wire["RobotDescription"], { last_pose?: L
 
 export type ContributionEntry = Exactly<Wire["ContributionEntry"], { pose: [number, number, number] }>;
 export type ContributionPage = Exactly<Wire["ContributionPage"], { contributions: ContributionEntry[] }>;
+
+export type NewRevert = Wire["NewRevert"];
+export type Revert = Wire["Revert"];
+export type RevertPage = Wire["RevertPage"];
+export type RevertPreview = Wire["RevertPreview"];
+export type RobotShare = Wire["RobotShare"];
+export type ChangeCounts = Wire["ChangeCounts"];

@@ -21,6 +21,7 @@ import { batchesOf } from "./batches";
 import type { Frame } from "./frame";
 import { paintClusters } from "./paint_clusters";
 import { paintGrid } from "./paint_grid";
+import { paintPreview } from "./paint_preview";
 import { paintRaster } from "./paint_raster";
 import { paintRobots } from "./paint_robots";
 import { paintSegments } from "./paint_segments";
@@ -126,6 +127,7 @@ export function createMapView(options: MapViewOptions): MapView {
   ) as Record<LayerName, Layer>;
   const selectionLayer = createPainterLayer("selection", (frame) => {
     paintSelection(frame, state, theme());
+    paintPreview(frame, state, theme());
   });
 
   const projection = new Projection({ code: "mapfold:level", units: "m", metersPerUnit: 1, axisOrientation: "enu" });
@@ -283,6 +285,7 @@ function drawnFrom(state: State): readonly unknown[] {
     state.heardAtMs,
     state.slots,
     state.selection,
+    state.log.preview,
     state.evidence,
     state.level,
     state.nowMs,

@@ -14,11 +14,16 @@ interface Item {
 
 export function createContributionsCard(
   parent: HTMLElement,
-  options: { store: Store; theme: () => Theme },
+  options: { store: Store; theme: () => Theme; onOpenLog: () => void },
 ): (state: State) => void {
+  const all = el("button", {
+    text: "Log …",
+    attrs: { type: "button", id: "open-log", title: "All contributions of this level; take some out of the map", "aria-controls": "log" },
+    on: { click: options.onOpenLog },
+  });
   const list = el("ul", { class: "contributions" });
   const none = el("p", { class: "hint", text: "None yet." });
-  parent.append(el("section", { class: "card" }, el("h2", { text: "Latest contributions" }), list, none));
+  parent.append(el("section", { class: "card" }, el("div", { class: "card-head" }, el("h2", { text: "Latest contributions" }), all), list, none));
   const drawRows = keyed<Item>(list, {
     key: ({ entry }) => entry.id,
     make: ({ entry }) => createRow(entry, options),
@@ -26,11 +31,13 @@ export function createContributionsCard(
   return (state) => {
     const entries = state.contributions ?? [];
     drawRows(entries.map((entry) => ({ entry, state })));
+    all.setAttribute("aria-expanded", String(state.log.open));
     setShown(none, state.contributions !== null && entries.length === 0);
   };
 }
 
-function howMuch(entry: ContributionEntry): string {
+/** What a contribution holds, in words. */
+export function howMuch(entry: ContributionEntry): string {
   const parts = [
     entry.segments > 0 ? counted(entry.segments, "segment") : "",
     entry.clusters > 0 ? counted(entry.clusters, "cluster") : "",
@@ -70,7 +77,7 @@ function createRow(entry: ContributionEntry, { store, theme }: { store: Store; t
     draw({ entry: now, state }) {
       line.draw(strokeOf(theme(), state.slots.get(now.robot) ?? 0));
       const name = state.robots.find((robot) => robot.robot === now.robot)?.name ?? now.robot;
-      setText(who, now.state === "folded" ? name : `${name} · ${now.state}`);
+      setText(who, now.state === "folded" ? name : `${name} · ${now.state === "held" ? "held" : "taken out"}`);
       setText(place, `#${count(now.revision)}`);
       setText(when, ago(Date.parse(now.received_at), state.nowMs));
       setText(what, `${howMuch(now)}${now.emulated ? " · emulated" : ""}`);

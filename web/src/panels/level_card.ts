@@ -4,7 +4,7 @@ import { tileCount } from "../content";
 import { el, setText } from "../dom";
 import { memo } from "../memo";
 import type { State } from "../state";
-import { count, lengthInWords } from "../words";
+import { count, counted, lengthInWords } from "../words";
 
 export function createLevelCard(parent: HTMLElement): (state: State) => void {
   const title = el("h2");
@@ -27,6 +27,13 @@ export function createLevelCard(parent: HTMLElement): (state: State) => void {
     });
     const behind = level === null ? 0 : level.revision - Math.max(level.folded_revision, content.vectorRevision);
     const cell = level === null ? "" : `Cells of ${lengthInWords(level.resolution_m)}`;
-    setText(foot, behind > 0 ? `${cell} · ${count(behind)} on the way into the map` : cell);
+    const { contributions = 0, in_force = contributions } = level?.counts ?? {};
+    const out = contributions - in_force;
+    const parts = [
+      cell,
+      out > 0 ? `${counted(out, "contribution")} kept out of the map` : "",
+      behind > 0 ? `${count(behind)} on the way into the map` : "",
+    ];
+    setText(foot, parts.filter((part) => part !== "").join(" · "));
   };
 }

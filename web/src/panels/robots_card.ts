@@ -5,7 +5,7 @@ import { el, keyed, setShown, setText, swatch, type Row } from "../dom";
 import { strokeOf, strokeOfSeveral, type Theme } from "../palette";
 import { isHere, isSilent, type State } from "../state";
 import type { Store } from "../store";
-import { ago, counted } from "../words";
+import { ago, count, counted } from "../words";
 import type { RobotDescription } from "../wire";
 
 interface Item {
@@ -62,7 +62,9 @@ function createRow(slug: string, { store, theme }: { store: Store; theme: () => 
     draw({ robot, state }) {
       line.draw(strokeOf(theme(), state.slots.get(slug) ?? 0));
       setText(name, robot.name);
-      setText(what, `${competenceInWords(robot)} · ${counted(robot.contributions, "contribution")}`);
+      const { contributions, reverted = 0 } = robot;
+      const out = reverted > 0 ? `, ${count(reverted)} taken out` : "";
+      setText(what, `${competenceInWords(robot)} · ${counted(contributions, "contribution")}${out}`);
       const silent = isSilent(state, slug);
       button.classList.toggle("silent", silent);
       setText(when, whenInWords(state, robot, silent));
