@@ -6,9 +6,12 @@ use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use mapfold_client::evidence::{Canvas, ScannerEvidenceConfig, scanner_evidence};
-use mapfold_client::perception::{Config, extract};
+use mapfold_client::perception::correction::CorrectionConfig;
+use mapfold_client::perception::plausibility::{PlausibilityConfig, judge};
+use mapfold_client::perception::{Config, Corrector, extract};
 use mapfold_client::sensor::{Scan, ScannerProfile, preset};
 use mapfold_map::geometry::{Covariance, Pose, UncertainPose};
+use mapfold_schema::v1::RangeCorrection;
 
 #[path = "../tests/worlds/room.rs"]
 mod room;
@@ -56,6 +59,40 @@ fn perception(c: &mut Criterion) {
     group.finish();
 }
 
+/// A table that covers the corridor, every 10 cm and 10 degrees.
+fn corrected_profile() -> ScannerProfile {
+    let distances: Vec<f64> = (1..400).map(|i| 0.1 * f64::from(i)).collect();
+    let bias = distances.iter().map(|d| 0.03 * (3.0 * d).sin()).collect();
+    let correction = RangeCorrection {
+        incidences_rad: (0..8).map(|i| f64::from(10 * i).to_radians()).collect(),
+        bias_m: vec![bias; 8],
+        sd_m: vec![vec![0.01; distances.len()]; 8],
+        distances_m: distances,
+        incidence_max_rad: 65f64.to_radians(),
+    };
+    ScannerProfile { correction: Some(correction), ..profile() }
+}
+
+fn correction(c: &mut Criterion) {
+    let profile = corrected_profile();
+    let plausibility = PlausibilityConfig::for_scanner(&profile);
+    let mut corrector = Corrector::for_scanner(&profile, CorrectionConfig::STANDARD).unwrap();
+    let mut group = c.benchmark_group("correct");
+    for (beams, increment) in [(180, 1.0), (361, 0.5), (1081, 0.25)] {
+        let scans = scans(beams, increment);
+        let judged: Vec<_> = scans.iter().map(|scan| judge(scan, &plausibility)).collect();
+        let mut corrected = corrector.correct(&scans[0], &judged[0]);
+        let mut i = 0;
+        group.bench_function(BenchmarkId::from_parameter(beams), |b| {
+            b.iter(|| {
+                i = (i + 1) % scans.len();
+                corrector.correct_into(black_box(&scans[i]), &judged[i], &mut corrected);
+            });
+        });
+    }
+    group.finish();
+}
+
 fn evidence(c: &mut Criterion) {
     let profile = profile();
     let pose = UncertainPose {
@@ -86,5 +123,5 @@ fn evidence(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, perception, evidence);
+criterion_group!(benches, perception, correction, evidence);
 criterion_main!(benches);

@@ -61,8 +61,8 @@ pub struct BeamNoise {
 pub struct Corrected {
     /// The scan with corrected ranges; readings that gave no point stay as they were.
     pub scan: Scan,
-    /// What became of the beams: those met at too great an incidence or outside the table are no
-    /// hits any more.
+    /// What became of the beams: lone ones, those met at too great an incidence and those outside
+    /// the table are no hits any more.
     pub states: Vec<BeamState>,
     /// The noise of each hit.
     pub noise: Vec<BeamNoise>,
@@ -163,7 +163,9 @@ impl Corrector {
         for spot in &self.spots[overlap..overlap + count] {
             let reading = scan.ranges[spot.beam];
             into.incidences[spot.beam] = spot.incidence.angle;
-            if spot.incidence.angle > self.table.incidence_max() {
+            if spot.run.0 == spot.run.1 {
+                into.states[spot.beam] = BeamState::Isolated;
+            } else if spot.incidence.angle > self.table.incidence_max() {
                 into.states[spot.beam] = BeamState::Oblique;
             } else if let Some((found, noise)) = corrected(&self.table, reading, spot.incidence) {
                 into.scan.ranges[spot.beam] = found.range;
@@ -495,7 +497,7 @@ mod tests {
         let ranges: Vec<f64> = (0..40).map(|i| 2.0 + 0.04 * f64::from(i * 7 % 5)).collect();
         let scan = Scan {
             geometry: ScanGeometry { first_bearing: 0.0, increment: PI / 180.0 },
-            ranges: [&ranges[..], &[9.9; 4], &[2.0; 3], &[f64::NAN; 4], &[4.3]].concat(),
+            ranges: [&ranges[..], &[9.9; 4], &[2.0; 3], &[f64::NAN; 4], &[2.3]].concat(),
             range_max: 99.0,
             robot_from_sensor: Pose::identity(),
         };
@@ -511,7 +513,7 @@ mod tests {
         }
         assert_eq!(done.states[40], BeamState::Uncalibrated);
         assert_eq!(done.states[47], BeamState::NoReturn);
-        assert_eq!(*done.states.last().unwrap(), BeamState::Uncalibrated);
+        assert_eq!(done.states[51], BeamState::Isolated);
     }
 
     #[test]

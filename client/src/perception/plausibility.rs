@@ -17,6 +17,10 @@ pub enum BeamState {
     Invalid,
     /// The mean of two surfaces that shared the beam (a "veil"): no surface is there.
     Mixed,
+    /// Far from what the beams on both sides saw, by a scanner whose ranges need correction: such
+    /// heads err now and then for no reason that one reading tells. (Of other scanners a lone
+    /// reading makes no feature either, but may be a table's leg.)
+    Isolated,
     /// A surface met at a greater incidence than the scanner's correction is good for.
     Oblique,
     /// Nearer or farther than the scanner's correction was measured.
