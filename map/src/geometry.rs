@@ -13,6 +13,7 @@ pub use covariance::{Covariance, CovarianceError, mahalanobis_sq};
 pub use frame::{Level, Odom, Robot, Sensor};
 pub use hull::{convex_hull, distance_to_hull};
 pub use interval::{Interval, subtract_intervals, union_intervals};
+pub(crate) use line::Axes;
 pub use line::{Line, MovedLine, UncertainLine, tangent, unit_normal};
 pub use pose::{Pose, UncertainPose};
 

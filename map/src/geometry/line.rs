@@ -65,6 +65,38 @@ impl<F: Copy> Line<F> {
     }
 }
 
+/// A line with its unit vectors worked out, for many questions about it; the answers are those of
+/// [`Line`] to the last bit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Axes {
+    pub(crate) normal: Point,
+    pub(crate) tangent: Point,
+    rho: f64,
+    foot: Point,
+}
+
+impl Axes {
+    pub(crate) fn of<F: Copy>(line: &Line<F>) -> Self {
+        let normal = unit_normal(line.alpha);
+        Self { normal, tangent: tangent(line.alpha), rho: line.rho, foot: normal * line.rho }
+    }
+
+    /// As [`Line::at`].
+    pub(crate) fn at(&self, t: f64) -> Point {
+        self.foot + self.tangent * t
+    }
+
+    /// As [`Line::along`].
+    pub(crate) fn along(&self, p: &Point) -> f64 {
+        self.tangent.dot(p)
+    }
+
+    /// As [`Line::across`].
+    pub(crate) fn across(&self, p: &Point) -> f64 {
+        self.normal.dot(p) - self.rho
+    }
+}
+
 /// A line with the covariance of (rho, alpha).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UncertainLine<F> {

@@ -58,7 +58,7 @@ pub(super) fn seen_through<E: Evidence>(
     let resolution = grid.resolution();
     let free_below = LogOdds::from_nat(config.free_below).0;
     let one_look = LogOdds::from_nat(config.free_look).0.max(1);
-    let towards_free = wall.towards_free() * resolution;
+    let towards_free = wall.towards_free * resolution;
     let step = ((resolution * 1e3).round() as i64).max(1);
     let least = (config.seen_through_min * 1e3).round() as i64;
     let mut reader = Reader { grid, tile: None };
@@ -69,7 +69,7 @@ pub(super) fn seen_through<E: Evidence>(
         let mut at = piece.from.div_euclid(step) * step;
         while at < piece.to {
             let middle = at + step / 2;
-            let p = wall.line.at(middle as f64 * 1e-3);
+            let p = wall.axes.at(middle as f64 * 1e-3);
             let mut value = |cells: i32| reader.value(&(p + towards_free * f64::from(cells)));
             let lies_in_free_space =
                 (-CELLS_BESIDE..=CELLS_BESIDE).all(|cells| value(cells) < free_below);
@@ -120,7 +120,7 @@ pub(super) fn tiles_along(wall: &Wall, resolution: f64) -> Vec<TileIndex> {
         for i in 0..=samples.max(1) {
             let t =
                 piece.from_m() + (piece.to_m() - piece.from_m()) * i as f64 / samples.max(1) as f64;
-            let p = wall.line.at(t);
+            let p = wall.axes.at(t);
             let margin = 0.5 * side;
             for corner in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
                 let q = p + Point::new(corner.0, corner.1) * margin;

@@ -4,7 +4,7 @@ use super::fusion::{FusedLine, fuse};
 use super::sighting::Sighting;
 use super::{EndKind, Facing, VectorConfig};
 use crate::geometry::{
-    Covariance, Interval, Level, Line, Point, UncertainLine, subtract_intervals, tangent,
+    Axes, Covariance, Interval, Level, Line, Point, UncertainLine, subtract_intervals, tangent,
     union_intervals, unit_normal,
 };
 use crate::level::{FeatureId, RobotName};
@@ -13,6 +13,9 @@ use crate::level::{FeatureId, RobotName};
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Wall {
     pub(super) line: Line<Level>,
+    pub(super) axes: Axes,
+    /// The direction in which free space lies.
+    pub(super) towards_free: Point,
     pub(super) independent: Covariance<2>,
     pub(super) dependent: Covariance<2>,
     pub(super) facing: Facing,
@@ -42,6 +45,7 @@ impl Wall {
     ) -> Option<Self> {
         let fused = fuse(group.clone(), leader, config)?;
         let (line, independent, dependent, facing) = in_level_frame(&fused);
+        let axes = Axes::of(&line);
         let mut seen = Vec::new();
         let mut covers = Vec::new();
         let mut ends = Vec::new();
@@ -49,8 +53,8 @@ impl Wall {
         let mut last_look = None;
         let (mut looks, mut first_seen_us, mut last_seen_us) = (0, i64::MAX, i64::MIN);
         for (id, sighting) in group {
-            let [a, b] = sighting.end_points().map(|p| line.along(&p));
-            let [sure_a, sure_b] = sighting.sure_ends(config).map(|p| line.along(&p));
+            let [a, b] = sighting.end_points().map(|p| axes.along(&p));
+            let [sure_a, sure_b] = sighting.sure_ends(config).map(|p| axes.along(&p));
             let span = Interval::from_metres(sure_a, sure_b);
             seen.push(span);
             covers.extend([(span.from, 1), (span.to, -1)]);
@@ -79,6 +83,11 @@ impl Wall {
         );
         Some(Self {
             line,
+            axes,
+            towards_free: match facing {
+                Facing::Origin => -axes.normal,
+                Facing::Away => axes.normal,
+            },
             independent,
             dependent,
             facing,
@@ -96,17 +105,8 @@ impl Wall {
     pub(super) fn extent(&self) -> (Point, Point) {
         let first = self.seen.first().map_or(0.0, Interval::from_m);
         let last = self.seen.last().map_or(0.0, Interval::to_m);
-        let (a, b) = (self.line.at(first), self.line.at(last));
+        let (a, b) = (self.axes.at(first), self.axes.at(last));
         (a.inf(&b), a.sup(&b))
-    }
-
-    /// The direction in which free space lies.
-    pub(super) fn towards_free(&self) -> Point {
-        let n = unit_normal(self.line.alpha());
-        match self.facing {
-            Facing::Origin => -n,
-            Facing::Away => n,
-        }
     }
 
     /// How many observations cover the wall at `at` millimetres.
@@ -117,19 +117,19 @@ impl Wall {
 
     /// How many observations cover the wall abreast of `p`.
     pub(super) fn looks_beside(&self, p: &Point) -> i64 {
-        self.looks_at((self.line.along(p) * 1e3).round() as i64)
+        self.looks_at((self.axes.along(p) * 1e3).round() as i64)
     }
 
     /// Whether `other` may be the other face of this wall: it faces the opposite side and lies not
     /// further than `config.thickness_max` behind.
     pub(super) fn is_backed_by(&self, other: &Self, config: &VectorConfig) -> bool {
-        let free = self.towards_free();
+        let free = self.towards_free;
         let behind = |i: &Interval| {
-            let p = other.line.at(0.5 * (i.from_m() + i.to_m()));
-            let depth = free.dot(&(self.line.at(self.line.along(&p)) - p));
+            let p = other.axes.at(0.5 * (i.from_m() + i.to_m()));
+            let depth = free.dot(&(self.axes.at(self.axes.along(&p)) - p));
             (-config.duplicate_offset..=config.thickness_max).contains(&depth)
         };
-        free.dot(&other.towards_free()) < -config.angle_max.cos() && other.seen.iter().any(behind)
+        free.dot(&other.towards_free) < -config.angle_max.cos() && other.seen.iter().any(behind)
     }
 
     /// What is known of the wall's end at `at` millimetres: a corner rather than a physical end rather
@@ -148,14 +148,14 @@ impl Wall {
         other_pieces: impl Iterator<Item = Interval>,
         config: &VectorConfig,
     ) -> Vec<Interval> {
-        if self.towards_free().dot(&other.towards_free()) < config.angle_max.cos() {
+        if self.towards_free.dot(&other.towards_free) < config.angle_max.cos() {
             return Vec::new();
         }
-        let across = |t: f64| other.line.across(&self.line.at(t)).abs() <= config.duplicate_offset;
+        let across = |t: f64| other.axes.across(&self.axes.at(t)).abs() <= config.duplicate_offset;
         let mut shared = Vec::new();
         for theirs in other_pieces {
             let [a, b] =
-                [theirs.from_m(), theirs.to_m()].map(|t| self.line.along(&other.line.at(t)));
+                [theirs.from_m(), theirs.to_m()].map(|t| self.axes.along(&other.axes.at(t)));
             let theirs = Interval::from_metres(a, b);
             for own in pieces {
                 let both = Interval { from: own.from.max(theirs.from), to: own.to.min(theirs.to) };

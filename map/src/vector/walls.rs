@@ -18,6 +18,8 @@ use crate::raster::TileIndex;
 struct Placed {
     wall: Wall,
     rank: Rank,
+    /// Lower left and upper right corner of where another wall may be the same one.
+    reach: (Point, Point),
     tiles: Vec<TileIndex>,
 }
 
@@ -89,10 +91,10 @@ impl Walls {
         changed: &mut BTreeSet<FeatureId>,
     ) {
         if let Some(old) = self.placed.remove(&id) {
-            self.places.remove(id, reach(&old.wall));
+            self.places.remove(id, old.reach);
             self.by_tile.remove(id, &old.tiles);
             unpublished.remove(&old.rank);
-            self.unpublish_near(&old.wall, unpublished);
+            unpublished.extend(self.near(old.reach).map(|(_, placed)| placed.rank));
         }
         let made = self.sightings.get(id).and_then(|(leader, rank)| {
             let group: Vec<(FeatureId, &Sighting)> = self.sightings.group(id)?.collect();
@@ -101,11 +103,12 @@ impl Walls {
         match made {
             Some((wall, rank)) => {
                 let tiles = tiles_along(&wall, resolution);
-                self.places.insert(id, reach(&wall));
+                let reach = reach(&wall);
+                self.places.insert(id, reach);
                 self.by_tile.insert(id, &tiles);
-                self.unpublish_near(&wall, unpublished);
-                self.placed.insert(id, Placed { wall, rank, tiles });
-                unpublished.insert(rank);
+                self.placed.insert(id, Placed { wall, rank, reach, tiles });
+                // It may be the other face of any of them; the wall itself is among them.
+                unpublished.extend(self.near(reach).map(|(_, placed)| placed.rank));
             }
             None => {
                 if published.remove(&id).is_some() {
@@ -115,21 +118,17 @@ impl Walls {
         }
     }
 
-    /// All walls near `wall` have to be published anew: it may be their other face.
-    fn unpublish_near(&self, wall: &Wall, unpublished: &mut BTreeSet<Rank>) {
-        let near = self.places.near(reach(wall));
-        unpublished.extend(near.iter().filter_map(|id| Some(self.placed.get(id)?.rank)));
-    }
-
-    /// Later walls near `wall` have to be published anew: it may publish what they saw too.
-    fn unpublish_later(&self, wall: &Wall, rank: Rank, unpublished: &mut BTreeSet<Rank>) {
-        for id in self.places.near(reach(wall)) {
-            if let Some(other) = self.placed.get(&id)
-                && other.rank > rank
-            {
-                unpublished.insert(other.rank);
-            }
-        }
+    /// All walls whose reach overlaps `reach`.
+    fn near(&self, reach: (Point, Point)) -> impl Iterator<Item = (FeatureId, &Placed)> {
+        let (low, high) = reach;
+        self.places
+            .near(reach)
+            .into_iter()
+            .filter_map(|id| Some((id, self.placed.get(&id)?)))
+            .filter(move |(_, placed)| {
+                let (from, to) = placed.reach;
+                from.x <= high.x && low.x <= to.x && from.y <= high.y && low.y <= to.y
+            })
     }
 
     fn publish<E: Evidence>(
@@ -151,7 +150,9 @@ impl Walls {
             None => published.remove(&rank.id),
         };
         changed.insert(rank.id);
-        self.unpublish_later(&placed.wall, rank, unpublished);
+        // Later walls may publish what this one saw too.
+        let later = self.near(placed.reach).filter(|(_, other)| other.rank > rank);
+        unpublished.extend(later.map(|(_, other)| other.rank));
     }
 
     /// What is published of a wall: what was seen of it, without what scanners look through and
@@ -164,12 +165,7 @@ impl Walls {
         config: &VectorConfig,
     ) -> Option<Segment> {
         let wall = &placed.wall;
-        let neighbours: Vec<(FeatureId, &Placed)> = self
-            .places
-            .near(reach(wall))
-            .into_iter()
-            .filter_map(|id| Some((id, self.placed.get(&id)?)))
-            .collect();
+        let neighbours: Vec<(FeatureId, &Placed)> = self.near(placed.reach).collect();
         let backs: Vec<&Wall> = neighbours
             .iter()
             .map(|(_, other)| &other.wall)
