@@ -19,6 +19,8 @@ pub(super) struct Sighting {
     pub(super) half_length: f64,
     /// The ends at `middle - half_length * tangent` and `middle + half_length * tangent`.
     pub(super) ends: [ObservedEnd; 2],
+    /// What this look saw through of the line, metres along it from the middle.
+    seen_through: Vec<(f64, f64)>,
     /// Variance of the middle's place along the line from the pose's error, square metres.
     along_variance: f64,
     /// Covariance of (offset, alpha) from the sensor's errors in this look alone.
@@ -87,6 +89,11 @@ impl Sighting {
             middle,
             half_length: (segment.to - segment.from) * 0.5,
             ends: segment.ends,
+            seen_through: segment
+                .seen_through
+                .iter()
+                .map(|i| (i.from_m() - along, i.to_m() - along))
+                .collect(),
             along_variance: along_pose.matrix()[(0, 0)],
             independent,
             own_fix,
@@ -112,6 +119,10 @@ impl Sighting {
         self.normal = -self.normal;
         self.tangent = -self.tangent;
         self.ends.swap(0, 1);
+        for (from, to) in &mut self.seen_through {
+            (*from, *to) = (-*to, -*from);
+        }
+        self.seen_through.reverse();
         self.independent = flip * self.independent * flip;
         self.own_fix = flip * self.own_fix * flip;
         self.dependent = flip * self.dependent * flip;
@@ -137,6 +148,12 @@ impl Sighting {
             self.half_length - (config.end_margin * sd).min(0.5 * self.half_length)
         });
         [self.middle - self.tangent * from, self.middle + self.tangent * to]
+    }
+
+    /// The ends of what this look saw through of the line.
+    pub(super) fn openings(&self) -> impl Iterator<Item = [Point; 2]> {
+        let at = |t: f64| self.middle + self.tangent * t;
+        self.seen_through.iter().map(move |(from, to)| [at(*from), at(*to)])
     }
 
     /// Offset from `anchor` and lever from the own middle to it.

@@ -48,6 +48,7 @@ impl Wall {
         let axes = Axes::of(&line);
         let mut seen = Vec::new();
         let mut covers = Vec::new();
+        let mut openings = Vec::new();
         let mut ends = Vec::new();
         let mut robots = Vec::new();
         let mut last_look = None;
@@ -63,6 +64,14 @@ impl Wall {
             if last_look != Some(id.contribution) {
                 looks += 1;
                 last_look = Some(id.contribution);
+                openings.push(Vec::new());
+            }
+            // Two pieces of one look tell of the same opening between them: it counts once.
+            if let Some(of_look) = openings.last_mut() {
+                of_look.extend(sighting.openings().map(|ends| {
+                    let [a, b] = ends.map(|p| axes.along(&p));
+                    Interval::from_metres(a, b)
+                }));
             }
             robots.push(sighting.robot.clone());
             first_seen_us = first_seen_us.min(sighting.observed_at_us);
@@ -71,15 +80,19 @@ impl Wall {
         robots.sort_unstable();
         robots.dedup();
         ends.sort_unstable();
-        covers.sort_unstable();
-        let mut count = 0;
-        for (_, change) in &mut covers {
-            count += *change;
-            *change = count;
-        }
+        let covers = counts(covers);
+        let openings = openings
+            .iter()
+            .flat_map(|of_look| union_intervals(of_look, 0))
+            .flat_map(|opening| [(opening.from, 1), (opening.to, -1)])
+            .collect();
+        let not_there = [
+            thinly_covered(&covers, config.thin_share, config.thin_reach),
+            open(&covers, &counts(openings), config.through_share),
+        ];
         let seen = subtract_intervals(
             &union_intervals(&seen, BRIDGE_MM),
-            &thinly_covered(&covers, config.thin_share, config.thin_reach),
+            &union_intervals(&not_there.concat(), 0),
         );
         Some(Self {
             line,
@@ -111,8 +124,7 @@ impl Wall {
 
     /// How many observations cover the wall at `at` millimetres.
     pub(super) fn looks_at(&self, at: i64) -> i64 {
-        let next = self.covers.partition_point(|(from, _)| *from <= at);
-        next.checked_sub(1).map_or(0, |i| self.covers[i].1)
+        count_at(&self.covers, at)
     }
 
     /// How many observations cover the wall abreast of `p`.
@@ -166,6 +178,46 @@ impl Wall {
         }
         union_intervals(&shared, 0)
     }
+}
+
+/// From where on how many, ascending, from where each begins (+1) and ends (-1).
+fn counts(mut changes: Vec<(i64, i64)>) -> Vec<(i64, i64)> {
+    changes.sort_unstable();
+    let mut count = 0;
+    for (_, change) in &mut changes {
+        count += *change;
+        *change = count;
+    }
+    changes
+}
+
+fn count_at(counts: &[(i64, i64)], at: i64) -> i64 {
+    let next = counts.partition_point(|(from, _)| *from <= at);
+    next.checked_sub(1).map_or(0, |i| counts[i].1)
+}
+
+/// Where looks say that they saw through: any, where no look covers the wall; otherwise more than
+/// one, and more than a `share` of those that do. Ascending.
+fn open(covers: &[(i64, i64)], openings: &[(i64, i64)], share: f64) -> Vec<Interval> {
+    let mut open = Vec::new();
+    for pair in openings.windows(2) {
+        let (stretch, through) = (Interval { from: pair[0].0, to: pair[1].0 }, pair[0].1);
+        if through == 0 {
+            continue;
+        }
+        // The counts of looks change within the stretch.
+        let first = covers.partition_point(|(from, _)| *from <= stretch.from);
+        let last = covers.partition_point(|(from, _)| *from < stretch.to);
+        let edges = covers[first.min(last)..last].iter().map(|(at, _)| *at);
+        let starts = std::iter::once(stretch.from).chain(edges.clone());
+        for (from, to) in starts.zip(edges.chain([stretch.to])) {
+            let looks = count_at(covers, from);
+            if looks == 0 || (through > 1 && through as f64 > share * looks as f64) {
+                open.push(Interval { from, to });
+            }
+        }
+    }
+    open
 }
 
 /// Where fewer than a `share` of the looks cover a wall than do within `reach` metres: looks that

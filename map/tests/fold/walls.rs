@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use mapfold_map::geometry::{Covariance, Point, Pose, UncertainPose};
+use mapfold_map::geometry::{Covariance, Interval, Point, Pose, UncertainPose};
 use mapfold_map::level::{Contribution, Level, LevelConfig, Provenance};
 use mapfold_map::raster::{Cell, EvidencePatch, SensorClass, TILE_CELLS, TilePatch};
 use mapfold_map::vector::{ObservedEnd, Segment};
@@ -123,6 +123,123 @@ fn a_doorway_that_robots_look_through_is_open_and_closes_when_the_evidence_is_ta
     assert!((gap - 900).abs() <= 100, "the gap is {gap} mm");
     level.unfold(&looks[1..]);
     assert_eq!(only(&level).solid.len(), 1);
+}
+
+#[test]
+fn what_a_look_saw_through_is_not_bridged_and_several_open_what_others_claim() {
+    let pieces = [
+        (Point::new(1.0, 3.0), Point::new(2.97, 3.0)),
+        (Point::new(3.03, 3.0), Point::new(5.0, 3.0)),
+    ];
+    let from = Point::new(3.0, 1.0);
+    let whole = folded(&[look(0, &pieces, from, EXACT)]);
+    assert!((solid(&whole) - 4000).abs() < 59, "a gap of 6 cm is closed");
+    // The gap as the first piece's line has it, from the side on which the gap lies.
+    let through = |number| {
+        let mut look = look(number, &pieces, from, EXACT);
+        for (i, segment) in look.segments.iter_mut().enumerate() {
+            let (from, to) = (
+                Interval::from_metres(segment.to, segment.to + 0.06),
+                Interval::from_metres(segment.from - 0.06, segment.from),
+            );
+            // Seen from below, lines run from right to left.
+            segment.seen_through = vec![if i == 0 { to } else { from }];
+        }
+        look
+    };
+    let pieces_of = |level: &Level| only(level).solid.len();
+    let slit = folded(&[through(0)]);
+    assert_eq!((pieces_of(&whole), pieces_of(&slit)), (1, 2));
+    let long = (Point::new(1.0, 3.0), Point::new(5.0, 3.0));
+    let bold = |n: u64| (10..10 + n).map(move |i| look(i, &[long], from, EXACT));
+    let one: Vec<_> = bold(2).chain([through(0)]).collect();
+    assert_eq!(pieces_of(&folded(&one)), 1, "one look may err");
+    let two: Vec<_> = bold(2).chain([through(0), through(1)]).collect();
+    assert_eq!(pieces_of(&folded(&two)), 2);
+}
+
+#[test]
+fn a_door_survives_a_hundred_looks_from_both_sides() {
+    // A wall of 10 cm with a door of 0.8 m.
+    let faces = |y: f64| {
+        [(Point::new(1.0, y), Point::new(2.6, y)), (Point::new(3.4, y), Point::new(5.0, y))]
+    };
+    let mut chance = Chance(5);
+    let looks: Vec<Contribution> = (0..100)
+        .map(|i| {
+            let below = i % 2 == 0;
+            let (y, robot) = if below { (3.0, 1.0) } else { (3.1, 5.1) };
+            let mut walls = faces(y);
+            if !below {
+                walls = walls.map(|(a, b)| (b, a));
+            }
+            let from = Point::new(chance.uniform(1.5, 4.5), robot);
+            let mut look = look(i, &walls, from, NOISE);
+            let pose = &mut look.level_from_robot.pose;
+            *pose = Pose::new(
+                pose.x + chance.normal(NOISE.position),
+                pose.y + chance.normal(NOISE.position),
+                pose.heading() + chance.normal(NOISE.heading),
+            );
+            look
+        })
+        .collect();
+    let level = folded(&looks);
+    let mut counts = [0, 0];
+    for segment in level.map().segments.values().filter(|s| s.looks >= 10) {
+        let side = usize::from(segment.line.at(segment.solid[0].span.from_m()).y > 3.05);
+        counts[side] += segment.looks;
+    }
+    // Which of the two faces a wall is shows in its facing, however near they are.
+    assert!(counts.iter().sum::<u32>() >= 100, "{counts:?}");
+    for segment in level.map().segments.values() {
+        for piece in &segment.solid {
+            let at = |t: f64| segment.line.at(t).x;
+            let (a, b) = (at(piece.span.from_m()), at(piece.span.to_m()));
+            let (low, high) = (a.min(b), a.max(b));
+            assert!(high < 3.0 || low > 3.0, "a piece from {low} to {high} closes the door");
+        }
+    }
+    let facings: std::collections::BTreeSet<_> =
+        level.map().segments.values().filter(|s| s.looks >= 10).map(|s| s.facing).collect();
+    assert_eq!(facings.len(), 2, "two faces stay two");
+}
+
+#[test]
+fn a_wall_far_from_the_origin_is_no_worse_than_one_close_by() {
+    let error = |distance: f64| {
+        let (mut offset, mut claimed) = (0.0, 0.0);
+        for run in 0..40 {
+            let mut chance = Chance(run);
+            let shift = Point::new(0.6 * distance, 0.8 * distance);
+            let wall = (shift + Point::new(-1.0, 0.3), shift + Point::new(1.0, 0.9));
+            let looks: Vec<Contribution> = (0..8)
+                .map(|i| {
+                    let from = shift + Point::new(chance.uniform(-1.0, 1.0), -2.0);
+                    let mut look = look(100 * run + i, &[wall], from, NOISE);
+                    let pose = &mut look.level_from_robot.pose;
+                    *pose = Pose::new(
+                        pose.x + chance.normal(NOISE.position),
+                        pose.y + chance.normal(NOISE.position),
+                        pose.heading() + chance.normal(NOISE.heading),
+                    );
+                    look
+                })
+                .collect();
+            let level = folded(&looks);
+            let segment = level.map().segments.values().max_by_key(|s| s.looks).unwrap();
+            let middle = (wall.0 + wall.1) * 0.5;
+            offset += segment.line.across(&middle).powi(2);
+            let lever = -segment.line.along(&middle);
+            let total = (segment.independent + segment.dependent)
+                .transformed(&nalgebra::Matrix2::new(1.0, lever, 0.0, 1.0));
+            claimed += total.matrix()[(0, 0)];
+        }
+        ((offset / 40.0).sqrt(), (claimed / 40.0).sqrt())
+    };
+    let (near, far) = (error(5.0), error(500.0));
+    assert!((far.0 / near.0 - 1.0).abs() < 1e-6, "{near:?} {far:?}");
+    assert!((far.1 / near.1 - 1.0).abs() < 1e-6, "{near:?} {far:?}");
 }
 
 #[test]
