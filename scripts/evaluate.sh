@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Calibrates simulated scanners and measures their corrected ranges; compares what the maps of
-# simulated fleets claim with truth; replays every log there is through real servers on SQLite and
+# simulated fleets claim with truth; times the fold of vast floors; replays every log there is through real servers on SQLite and
 # PostgreSQL and measures the maps; and rewrites the tables in BENCHMARKS.md. Logs that may not be
 # committed are looked for in ../shared/data; without that folder: the committed logs and simulated
 # worlds.
@@ -11,4 +11,5 @@ cargo build --release --workspace --bins
 evaluate="${CARGO_TARGET_DIR:-target}/release/mapfold-evaluate"
 "$evaluate" range --report BENCHMARKS.md
 "$evaluate" honesty --report BENCHMARKS.md
+"$evaluate" growth --report BENCHMARKS.md --data ../shared/data
 scripts/with-postgres.sh "$evaluate" maps --report BENCHMARKS.md --data ../shared/data "$@"

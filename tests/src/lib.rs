@@ -4,12 +4,13 @@
 //! Everything here looks at Mapfold from outside: it starts `mapfold-server` and `mapfold-robot`,
 //! talks HTTP, and reads the wire types. It deliberately shares no geometry, no noise model and no
 //! log reader with the code that it checks. Where a part has to be measured by itself ([`range`],
-//! [`honesty`]), it is called as a library, and what it is measured against is still this crate's own.
+//! [`honesty`], [`growth`]), it is called as a library, and what it is measured against is still this crate's own.
 //!
 //! * [`carmen`]: reads laser logs and cuts them into parts, one for each robot of a fleet.
 //! * [`plane`], [`floor`], [`coverage`]: the merged map as plain shapes, and how well it agrees
 //!   with the readings that it was made of.
 //! * [`simulation`]: worlds of walls, drives through them with odometry noise, scanners, sonars.
+//! * [`growth`]: what one more contribution costs in small and in vast maps.
 //! * [`honesty`]: what maps claim against how wrong they are.
 //! * [`programs`], [`database`], [`server`], [`robot`], [`fleet`], [`meter`], [`api`], [`level`]: the real
 //!   programs, the network between them, and what they answer.
@@ -26,6 +27,7 @@ pub mod error;
 pub mod evaluation;
 pub mod fleet;
 pub mod floor;
+pub mod growth;
 pub mod honesty;
 pub mod level;
 pub mod meter;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use mapfold_tests::{evaluation, honesty, range, speed};
+use mapfold_tests::{evaluation, growth, honesty, range, speed};
 
 /// Measures Mapfold and rewrites the tables of a report between their markers.
 #[derive(Debug, Parser)]
@@ -42,6 +42,15 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         report: PathBuf,
     },
+    /// Times the fold of vast simulated floors and of logs, and taking contributions out again
+    Growth {
+        /// The page with the markers `growth`
+        #[arg(long, value_name = "FILE")]
+        report: PathBuf,
+        /// A folder with further logs, in `logs/`
+        #[arg(long, value_name = "DIR")]
+        data: Option<PathBuf>,
+    },
     /// Gathers the figures that Criterion has left in the target folder
     Benches {
         /// The page with the markers `benches`
@@ -61,6 +70,7 @@ async fn main() -> ExitCode {
         }
         Command::Range { report } => range::evaluate(&report, &range::FULL),
         Command::Honesty { report } => honesty::table(&report),
+        Command::Growth { report, data } => growth::tables(&report, data.as_deref()),
         Command::Benches { report, criterion } => speed::benches(&report, &criterion),
     };
     match done {
