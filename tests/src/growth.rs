@@ -5,7 +5,6 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
 use mapfold_client::log::carmen;
 use mapfold_client::replay::SensorChoice;
@@ -145,7 +144,7 @@ fn growth() -> Vec<(usize, f64)> {
                 floor.look_with_evidence(number + i, room.min(rooms - 1), &mut noise)
             })
             .collect();
-        let begin = Instant::now();
+        let begin = tokio::time::Instant::now();
         for look in &more {
             level.fold([look]);
         }
@@ -165,14 +164,14 @@ fn revert() -> (f64, f64, f64) {
     let looks: Vec<Contribution> =
         (0..ALL).map(|number| floor.look(number, number % rooms, &mut noise)).collect();
     let mut level = Level::new(LevelConfig::standard(0.05));
-    let begin = Instant::now();
+    let begin = tokio::time::Instant::now();
     level.fold(&looks);
     let fold = begin.elapsed().as_secs_f64();
     let out: Vec<&Contribution> = looks.iter().step_by(100).collect();
-    let begin = Instant::now();
+    let begin = tokio::time::Instant::now();
     level.unfold(out.iter().copied());
     let taken = begin.elapsed().as_secs_f64();
-    let begin = Instant::now();
+    let begin = tokio::time::Instant::now();
     level.fold(out.iter().copied());
     (taken, begin.elapsed().as_secs_f64(), fold)
 }
@@ -201,13 +200,13 @@ fn log(path: &Path) -> Result<(usize, f64, f64), Error> {
         .map(|look| look.contribution)
         .collect();
     let mut one_by_one = Level::new(LevelConfig::standard(0.05));
-    let begin = Instant::now();
+    let begin = tokio::time::Instant::now();
     for look in &looks {
         one_by_one.fold([look]);
     }
     let single = looks.len() as f64 / begin.elapsed().as_secs_f64();
     let mut at_once = Level::new(LevelConfig::standard(0.05));
-    let begin = Instant::now();
+    let begin = tokio::time::Instant::now();
     at_once.fold(&looks);
     Ok((looks.len(), single, looks.len() as f64 / begin.elapsed().as_secs_f64()))
 }

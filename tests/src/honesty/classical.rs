@@ -5,7 +5,7 @@ use mapfold_map::geometry::{Level, Pose, Robot, difference, tangent, unit_normal
 use mapfold_map::vector::{Facing, ObservedSegment};
 use nalgebra::{Matrix2, Vector2};
 
-use super::fix::MapLine;
+use super::fix::{MapLine, inverse};
 use super::room::{Room, Truth, Wall};
 
 /// Error (offset about the wall's middle, angle) of a wall's line, and its covariance.
@@ -34,8 +34,8 @@ impl Classical {
             *state = Some(match *state {
                 None => (z, c),
                 Some((x, p)) => {
-                    let Some(inverse) = (p + c).try_inverse() else { continue };
-                    let k = p * inverse;
+                    let Some(innovation) = inverse(&(p + c)) else { continue };
+                    let k = p * innovation;
                     let kept = Matrix2::identity() - k;
                     (x + k * (z - x), kept * p * kept.transpose() + k * c * k.transpose())
                 }
@@ -75,7 +75,7 @@ impl Classical {
     pub(super) fn errors(&self) -> impl Iterator<Item = f64> + '_ {
         self.walls.iter().filter_map(|state| {
             let (error, covariance) = (*state)?;
-            Some((error.transpose() * covariance.try_inverse()? * error)[(0, 0)])
+            Some((error.transpose() * inverse(&covariance)? * error)[(0, 0)])
         })
     }
 }

@@ -10,7 +10,7 @@ use mapfold_map::geometry::{
 };
 use mapfold_map::level::LevelMap;
 use mapfold_map::vector::{Facing, ObservedSegment};
-use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, SMatrix, Vector2, Vector3};
 
 /// A line of a map as a robot uses it: in normal form about the level's origin.
 #[derive(Debug, Clone, Copy)]
@@ -125,7 +125,7 @@ fn left_over(line: &MapLine, seen: &ObservedSegment, pose: &Pose<Level, Robot>) 
     let residual = expected.residual(seen);
     let spread =
         seen.line.covariance.matrix() + j * (line.independent + line.dependent) * j.transpose();
-    Some((residual.transpose() * spread.try_inverse()? * residual)[(0, 0)])
+    Some((residual.transpose() * inverse(&spread)? * residual)[(0, 0)])
 }
 
 fn pair<'a>(
@@ -156,6 +156,11 @@ fn pair<'a>(
         .map(|(_, line)| line)
 }
 
+/// The inverse of a covariance or of an information; `None` unless it is positive definite.
+pub(super) fn inverse<const N: usize>(of: &SMatrix<f64, N, N>) -> Option<SMatrix<f64, N, N>> {
+    nalgebra::Cholesky::new(*of).map(|factor| factor.inverse())
+}
+
 /// One step of Gauss-Newton and the covariance of its outcome.
 fn solve(
     pairs: &[(&MapLine, &ObservedSegment)],
@@ -170,14 +175,14 @@ fn solve(
         let (h, j) = (expected.j_pose(line), expected.j_line());
         let own = seen.line.covariance.matrix() + j * line.independent * j.transpose();
         let shared = j * line.dependent * j.transpose();
-        let inverse = (own + shared).try_inverse()?;
+        let inverse = inverse(&(own + shared))?;
         information += h.transpose() * inverse * h;
         weighted += h.transpose() * inverse * expected.residual(seen);
         parts.push((h.transpose() * inverse, own));
         shared_offset = shared_offset.max(shared[(0, 0)]);
         shared_angle = shared_angle.max(shared[(1, 1)]);
     }
-    let total = information.try_inverse()?;
+    let total = inverse(&information)?;
     let mut covariance =
         Matrix3::from_diagonal(&Vector3::new(shared_offset, shared_offset, shared_angle));
     for (gain, own) in parts {
