@@ -4,13 +4,23 @@
 //! with both uncertainties (`sighting`) -> grouped as a function of the set (`leaders`) -> fused
 //! without counting shared errors twice (`fusion`) -> a wall and what was seen of it (`wall`) -> held
 //! against free space in the grid (`seen_through`) and better walls (`walls`) -> published
-//! ([`Segment`]). Clusters go the same way, shorter (`things`).
+//! ([`Segment`]) -> oriented (`piece`), joined where ends meet
+//! (`joint`, `gap`, `chains`) and cut to valid outlines (`outline`, `crossing`): [`Chain`]. Clusters go
+//! the same way as segments, shorter (`things`), and end where a wall explains them (`explained`).
 
 mod by_tile;
+mod chain;
+mod chains;
 mod cluster;
 mod config;
+mod crossing;
+mod explained;
 mod fusion;
+mod gap;
+mod joint;
 mod leaders;
+mod outline;
+mod piece;
 mod seen_through;
 mod segment;
 mod sighting;
@@ -18,6 +28,8 @@ mod things;
 mod wall;
 mod walls;
 
+pub use chain::{Chain, ChainId, ChainKind, Vertex};
+pub(crate) use chains::Chains;
 pub use cluster::{Cluster, ObservedCluster};
 pub use config::VectorConfig;
 pub(crate) use seen_through::Evidence;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{Batch, Contribution, ContributionId, FeatureId, LevelMap, Misplaced};
 use crate::raster::{SensorClass, Tile, TileIndex, TileKey, TilePatch};
-use crate::vector::{Evidence, Things, VectorConfig, Walls};
+use crate::vector::{ChainId, Chains, Evidence, Things, VectorConfig, Walls};
 
 /// What a level's fold depends on besides its contributions.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +30,8 @@ pub struct Changes {
     pub segments: BTreeSet<FeatureId>,
     /// Clusters.
     pub clusters: BTreeSet<FeatureId>,
+    /// Chains.
+    pub chains: BTreeSet<ChainId>,
     /// Tiles.
     pub tiles: BTreeSet<TileKey>,
 }
@@ -42,6 +44,7 @@ pub struct Level {
     in_force: BTreeSet<ContributionId>,
     walls: Walls,
     things: Things,
+    chains: Chains,
 }
 
 /// The grid as the vector fold reads it.
@@ -69,6 +72,7 @@ impl Level {
             in_force: BTreeSet::new(),
             walls: Walls::default(),
             things: Things::default(),
+            chains: Chains::default(),
         }
     }
 
@@ -211,11 +215,17 @@ impl Level {
             .filter(|key| key.class == SensorClass::Scanner)
             .map(|key| key.tile)
             .collect();
-        let LevelMap { segments, clusters, tiles } = &mut self.map;
+        let LevelMap { segments, clusters, chains, tiles } = &mut self.map;
         let grid = Grid { tiles, resolution: self.config.resolution };
         let config = &self.config.vector;
         changes.segments = self.walls.update(inserted, removed, &touched, &grid, segments, config);
-        changes.clusters = self.things.update(inserted, removed, &touched, &grid, clusters, config);
+        let walls = &self.walls;
+        let changed = &changes.segments;
+        changes.clusters = self
+            .things
+            .update(inserted, removed, &touched, changed, segments, &grid, clusters, config);
+        changes.chains =
+            self.chains.update(changed, &touched, walls, segments, &grid, chains, config);
         changes
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::FeatureId;
 use crate::raster::{Tile, TileKey};
-use crate::vector::{Cluster, Segment};
+use crate::vector::{Chain, ChainId, Cluster, Segment};
 
 /// What robots and operators see of a level: what [`super::diff`] compares and
 /// [`super::apply`] brings up to date. A tile without evidence is not in it.
@@ -15,6 +15,8 @@ pub struct LevelMap {
     pub segments: BTreeMap<FeatureId, Arc<Segment>>,
     /// What no line explains.
     pub clusters: BTreeMap<FeatureId, Arc<Cluster>>,
+    /// Polylines and polygons of walls that meet.
+    pub chains: BTreeMap<ChainId, Arc<Chain>>,
     /// Evidence, tile by tile and layer by layer.
     pub tiles: BTreeMap<TileKey, Arc<Tile>>,
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{FeatureId, LevelMap};
 use crate::raster::{Tile, TileKey};
-use crate::vector::{Cluster, Segment};
+use crate::vector::{Chain, ChainId, Cluster, Segment};
 
 /// New and changed things whole, removed things by their identity.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -14,12 +14,16 @@ pub struct Patch {
     pub segments: BTreeMap<FeatureId, Arc<Segment>>,
     /// New or changed clusters.
     pub clusters: BTreeMap<FeatureId, Arc<Cluster>>,
+    /// New or changed chains.
+    pub chains: BTreeMap<ChainId, Arc<Chain>>,
     /// New or changed tiles.
     pub tiles: BTreeMap<TileKey, Arc<Tile>>,
     /// Segments that are no more.
     pub removed_segments: Vec<FeatureId>,
     /// Clusters that are no more.
     pub removed_clusters: Vec<FeatureId>,
+    /// Chains that are no more.
+    pub removed_chains: Vec<ChainId>,
     /// Tiles that hold no evidence any more.
     pub removed_tiles: Vec<TileKey>,
 }
@@ -29,9 +33,11 @@ impl Patch {
     pub fn is_empty(&self) -> bool {
         self.segments.is_empty()
             && self.clusters.is_empty()
+            && self.chains.is_empty()
             && self.tiles.is_empty()
             && self.removed_segments.is_empty()
             && self.removed_clusters.is_empty()
+            && self.removed_chains.is_empty()
             && self.removed_tiles.is_empty()
     }
 }
@@ -55,8 +61,18 @@ fn diff_kind<K: Ord + Copy, V: PartialEq>(
 pub fn diff(a: &LevelMap, b: &LevelMap) -> Patch {
     let (segments, removed_segments) = diff_kind(&a.segments, &b.segments);
     let (clusters, removed_clusters) = diff_kind(&a.clusters, &b.clusters);
+    let (chains, removed_chains) = diff_kind(&a.chains, &b.chains);
     let (tiles, removed_tiles) = diff_kind(&a.tiles, &b.tiles);
-    Patch { segments, clusters, tiles, removed_segments, removed_clusters, removed_tiles }
+    Patch {
+        segments,
+        clusters,
+        chains,
+        tiles,
+        removed_segments,
+        removed_clusters,
+        removed_chains,
+        removed_tiles,
+    }
 }
 
 fn apply_kind<K: Ord + Copy, V>(
@@ -76,5 +92,6 @@ fn apply_kind<K: Ord + Copy, V>(
 pub fn apply(patch: &Patch, map: &mut LevelMap) {
     apply_kind(&patch.segments, &patch.removed_segments, &mut map.segments);
     apply_kind(&patch.clusters, &patch.removed_clusters, &mut map.clusters);
+    apply_kind(&patch.chains, &patch.removed_chains, &mut map.chains);
     apply_kind(&patch.tiles, &patch.removed_tiles, &mut map.tiles);
 }

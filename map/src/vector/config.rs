@@ -51,6 +51,21 @@ pub struct VectorConfig {
     pub cluster_gap: f64,
     /// However uncertain, clusters whose hulls are further apart than this are two, metres.
     pub cluster_gap_max: f64,
+    /// Standard deviation of a hit about the wall that it belongs to, metres: a cluster whose hull
+    /// the gate allows to be such hits is explained by the wall.
+    pub hit_sd: f64,
+    /// Two walls whose directions have a smaller sine between them go on as each other; with a
+    /// greater one they meet in a corner.
+    pub corner_sine_min: f64,
+    /// An end may lie this far from the corner that it is joined in, metres, plus three standard
+    /// deviations of the distance.
+    pub joint_margin: f64,
+    /// However uncertain, an end further from a corner than this is not joined in it, metres.
+    pub joint_max: f64,
+    /// Standard deviation of a wall's end along it that comes from the spacing of beams, metres.
+    pub end_sd: f64,
+    /// Longer chains are cut where they are joined worst: the most pieces of one.
+    pub chain_pieces_max: usize,
 }
 
 impl VectorConfig {
@@ -78,5 +93,11 @@ impl VectorConfig {
         thickness_max: 0.30,
         cluster_gap: 0.10,
         cluster_gap_max: 0.30,
+        hit_sd: 0.03,
+        corner_sine_min: 0.2,
+        joint_margin: 0.10,
+        joint_max: 0.40,
+        end_sd: 0.03,
+        chain_pieces_max: 256,
     };
 }

@@ -6,9 +6,10 @@ use std::sync::Arc;
 use nalgebra::Matrix2;
 
 use super::by_tile::ByTile;
+use super::explained::Explained;
 use super::leaders::{Groupable, Leaders};
 use super::seen_through::{Evidence, all_free};
-use super::{Cluster, ObservedCluster, VectorConfig};
+use super::{Cluster, ObservedCluster, Segment, VectorConfig};
 use crate::geometry::{Covariance, Point, convex_hull, distance_to_hull};
 use crate::level::{Contribution, FeatureId, RobotName};
 use crate::raster::{Cell, TileIndex};
@@ -84,15 +85,20 @@ pub(crate) struct Things {
     /// Every cluster, published or not.
     clusters: BTreeMap<FeatureId, Arc<Cluster>>,
     by_tile: ByTile,
+    explained: Explained,
 }
 
 impl Things {
-    /// As [`super::walls::Walls::update`], for clusters.
+    /// As [`super::walls::Walls::update`], for clusters; `changed` are the `segments` that it
+    /// changed. A cluster that scanners look through, or that a wall explains, is not published.
+    #[expect(clippy::too_many_arguments, reason = "the map's layers and what changed in them")]
     pub(crate) fn update<E: Evidence>(
         &mut self,
         inserted: &[&Contribution],
         removed: &[&Contribution],
         touched: &BTreeSet<TileIndex>,
+        changed: &BTreeSet<FeatureId>,
+        segments: &BTreeMap<FeatureId, Arc<Segment>>,
         grid: &E,
         published: &mut BTreeMap<FeatureId, Arc<Cluster>>,
         config: &VectorConfig,
@@ -114,11 +120,13 @@ impl Things {
         for tile in touched {
             unpublished.extend(self.by_tile.of(*tile));
         }
+        unpublished.extend(self.explained.follow(changed, segments));
         let mut changed = BTreeSet::new();
         for id in unpublished {
             let cluster = self.clusters.get(&id).filter(|cluster| {
                 let points = cluster.hull.iter().chain([&cluster.centroid]);
                 !all_free(points, grid, config)
+                    && !self.explained.is_explained(cluster, segments, config)
             });
             if published.get(&id).map(AsRef::as_ref) == cluster.map(AsRef::as_ref) {
                 continue;
@@ -136,10 +144,12 @@ impl Things {
     fn fuse(&mut self, id: FeatureId, resolution: f64) {
         if let Some(old) = self.clusters.remove(&id) {
             self.by_tile.remove(id, &tiles_of(&old, resolution));
+            self.explained.forget(id, &old);
         }
         let Some(group) = self.sights.group(id) else { return };
         if let Some(cluster) = fuse_group(group) {
             self.by_tile.insert(id, &tiles_of(&cluster, resolution));
+            self.explained.note(id, &cluster);
             self.clusters.insert(id, Arc::new(cluster));
         }
     }

@@ -80,6 +80,11 @@ impl Walls {
         changed
     }
 
+    /// The rank and the middle of the observation that a wall is called after.
+    pub(super) fn founder(&self, id: FeatureId) -> Option<(Rank, Point)> {
+        self.sightings.get(id).map(|(leader, rank)| (rank, leader.middle))
+    }
+
     /// Makes the wall of a group anew, or ends it with its group.
     fn remake(
         &mut self,

@@ -1,6 +1,8 @@
 //! The fold as a function of the set: order, batches, removal and restoring do not matter.
 #![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
+mod chains;
+mod clusters;
 mod honesty;
 mod set_function;
 mod walls;

@@ -1,7 +1,7 @@
 //! Any order, any batches, any detour through removals, and restoring: the same bits.
 
 use mapfold_map::level::{
-    Batch, Contribution, Level, LevelConfig, LevelMap, Misplaced, apply, diff,
+    Batch, Changes, Contribution, Level, LevelConfig, LevelMap, Misplaced, apply, diff,
 };
 use proptest::prelude::*;
 
@@ -126,6 +126,10 @@ proptest! {
         for id in &changed {
             prop_assert!(changes.clusters.contains(id));
         }
+        let changed: Vec<_> = patch.chains.keys().chain(&patch.removed_chains).copied().collect();
+        for id in &changed {
+            prop_assert!(changes.chains.contains(id));
+        }
         let changed: Vec<_> = patch.tiles.keys().chain(&patch.removed_tiles).copied().collect();
         for key in &changed {
             prop_assert!(changes.tiles.contains(key));
@@ -140,5 +144,5 @@ fn folding_the_same_contribution_twice_changes_nothing() {
     let before = level.map().clone();
     let changes = level.fold(&looks);
     assert_eq!(level.map(), &before);
-    assert!(changes.segments.is_empty() && changes.clusters.is_empty() && changes.tiles.is_empty());
+    assert_eq!(changes, Changes::default());
 }

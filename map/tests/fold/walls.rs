@@ -10,9 +10,15 @@ use mapfold_map::vector::{ObservedEnd, Segment};
 
 use crate::world::{Chance, NOISE, Noise, id, looks, observe};
 
-const EXACT: Noise = Noise { position: 0.005, heading: 0.001, offset: 0.002, angle: 0.001 };
+pub(crate) const EXACT: Noise =
+    Noise { position: 0.005, heading: 0.001, offset: 0.002, angle: 0.001 };
 
-fn look(number: u64, walls: &[(Point, Point)], from: Point, noise: Noise) -> Contribution {
+pub(crate) fn look(
+    number: u64,
+    walls: &[(Point, Point)],
+    from: Point,
+    noise: Noise,
+) -> Contribution {
     let mut chance = Chance(number + 1000);
     let truth = Pose::new(from.x, from.y, chance.uniform(-3.0, 3.0));
     Contribution {
@@ -34,7 +40,7 @@ fn look(number: u64, walls: &[(Point, Point)], from: Point, noise: Noise) -> Con
     }
 }
 
-fn folded(looks: &[Contribution]) -> Level {
+pub(crate) fn folded(looks: &[Contribution]) -> Level {
     let mut level = Level::new(LevelConfig::standard(0.05));
     level.fold(looks);
     level
@@ -90,7 +96,13 @@ fn a_wall_through_the_origin_of_the_level_is_one_wall() {
 }
 
 /// A look that saw no wall, only gave `steps` of evidence to the cells from x0 to x1 and y0 to y1.
-fn area(number: u64, x: [f64; 2], y: [f64; 2], steps: i16, class: SensorClass) -> Contribution {
+pub(crate) fn area(
+    number: u64,
+    x: [f64; 2],
+    y: [f64; 2],
+    steps: i16,
+    class: SensorClass,
+) -> Contribution {
     let mut cells: BTreeMap<_, Box<[i16; TILE_CELLS]>> = BTreeMap::new();
     let count = |[from, to]: [f64; 2]| ((to - from) / 0.05).round() as i32;
     for column in 0..count(x) {
