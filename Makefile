@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help run page test bench evaluate fmt lint deny
+.PHONY: help run page test bench evaluate figure fmt lint deny
 
 help: ## list the commands
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "make %-9s %s\n", $$1, $$2}'
@@ -22,6 +22,9 @@ bench: ## run the speed benchmarks and rewrite their figures in BENCHMARKS.md
 
 evaluate: ## replay every log there is through real servers and rewrite the tables in BENCHMARKS.md
 	@scripts/evaluate.sh
+
+figure: ## draw docs/hallway.svg from a committed log, through a real server
+	@scripts/figure.sh
 
 fmt: ## format the Rust code
 	@cargo fmt --all

@@ -1,5 +1,6 @@
 //! The way in: wire types are checked here, once, and become `mapfold_map` types.
 
+mod chains;
 mod contribution;
 mod features;
 mod number;
@@ -7,6 +8,7 @@ mod sensors;
 mod violations;
 mod words;
 
+pub use chains::{chain_id, map_chain, parse_chain_id, wire_chain};
 pub use contribution::{check_contribution, wire_contribution};
 pub use features::{
     feature_id, map_cluster, map_patch, map_segment, map_tile, map_tile_address, parse_feature_id,

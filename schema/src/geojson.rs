@@ -1,4 +1,5 @@
-//! GeoJSON in level metres: a wall is one `LineString` per solid interval, a cluster a `Polygon`.
+//! GeoJSON in level metres: a wall is one `LineString` per solid interval, a cluster a `Polygon`, a
+//! chain the one or the other.
 //!
 //! RFC 7946 knows only longitude and latitude; that these coordinates are metres stands in the
 //! foreign member `coordinate_frame`. One feature a line, in the order of the features' ids, so
@@ -10,7 +11,7 @@ use mapfold_map::geometry::Line;
 use mapfold_map::level::LevelMap;
 use serde::Serialize;
 
-use crate::border::{wire_cluster, wire_segment};
+use crate::border::{wire_chain, wire_cluster, wire_segment};
 use crate::v1;
 
 /// Media type of GeoJSON.
@@ -31,7 +32,7 @@ struct Feature<'a> {
 #[derive(Serialize)]
 #[serde(tag = "type", content = "coordinates")]
 enum Geometry {
-    LineString([[f64; 2]; 2]),
+    LineString(Vec<[f64; 2]>),
     Polygon([Vec<[f64; 2]>; 1]),
 }
 
@@ -53,9 +54,17 @@ enum Properties<'a> {
         quality: u32,
         robots: &'a [String],
     },
+    Chain {
+        id: &'a str,
+        kind: &'static str,
+        shape: v1::ChainKind,
+        quality: u32,
+        segments: &'a [String],
+        robots: &'a [String],
+    },
 }
 
-/// Writes all segments and clusters of a map.
+/// Writes all segments, clusters and chains of a map.
 ///
 /// # Errors
 /// What `to` cannot take.
@@ -66,6 +75,9 @@ pub fn write_map(map: &LevelMap, to: &mut impl Write) -> io::Result<()> {
     }
     for (id, cluster) in &map.clusters {
         features.cluster(&wire_cluster(id, cluster))?;
+    }
+    for (id, chain) in &map.chains {
+        features.chain(&wire_chain(id, chain))?;
     }
     features.end()
 }
@@ -84,6 +96,9 @@ pub fn write_patch(patch: &v1::VectorPatch, to: &mut impl Write) -> io::Result<(
     }
     for cluster in &patch.clusters {
         features.cluster(cluster)?;
+    }
+    for chain in &patch.chains {
+        features.chain(chain)?;
     }
     features.end()
 }
@@ -107,7 +122,7 @@ impl<'w, W: Write> Features<'w, W> {
             let ends = [interval.from_m, interval.to_m].map(|t| line.at(t));
             self.feature(
                 format!("{}#{index}", segment.id),
-                Geometry::LineString(ends.map(|p| coordinates([p.x, p.y]))),
+                Geometry::LineString(ends.iter().map(|p| coordinates([p.x, p.y])).collect()),
                 Properties::Segment {
                     id: &segment.id,
                     kind: "segment",
@@ -131,6 +146,32 @@ impl<'w, W: Write> Features<'w, W> {
                 kind: "cluster",
                 quality: cluster.quality,
                 robots: &cluster.robots,
+            },
+        )
+    }
+
+    fn chain(&mut self, chain: &v1::Chain) -> io::Result<()> {
+        let mut vertices: Vec<[f64; 2]> =
+            chain.vertices_m.iter().copied().map(coordinates).collect();
+        let shape = if chain.closed {
+            // RFC 7946 wants outer rings counter-clockwise; obstacles run the other way.
+            if chain.kind == v1::ChainKind::Obstacle {
+                vertices.reverse();
+            }
+            Geometry::Polygon([ring(&vertices)])
+        } else {
+            Geometry::LineString(vertices)
+        };
+        self.feature(
+            chain.id.clone(),
+            shape,
+            Properties::Chain {
+                id: &chain.id,
+                kind: "chain",
+                shape: chain.kind,
+                quality: chain.quality,
+                segments: &chain.segments,
+                robots: &chain.robots,
             },
         )
     }
@@ -205,6 +246,7 @@ mod tests {
             revision: 9,
             segments: vec![segment()],
             clusters: Vec::new(),
+            chains: Vec::new(),
             removed: v1::Removed::default(),
         };
         let json = written(&patch);
@@ -220,6 +262,43 @@ mod tests {
         let expected = serde_json::json!([[2.0, -1.0], [2.0, 0.5]]);
         assert_eq!(features[0]["geometry"]["coordinates"], expected);
         assert_eq!((&json["since"], &json["revision"]), (&1.into(), &9.into()));
+    }
+
+    #[test]
+    fn a_chain_becomes_a_line_string_or_a_counter_clockwise_polygon() {
+        let square = [[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]];
+        let chain = |piece: u8, kind, vertices_m: &[[f64; 2]]| v1::Chain {
+            id: format!("0190a000-0000-7000-8000-000000000001-3.{piece}"),
+            kind,
+            closed: kind != v1::ChainKind::Polyline,
+            vertices_m: vertices_m.to_vec(),
+            covariances: vec![[[1e-4, 0.0], [0.0, 1e-4]]; vertices_m.len()],
+            segments: Vec::new(),
+            quality: 2,
+            robots: vec!["a".to_owned()],
+            first_seen: "2026-01-01T00:00:00Z".to_owned(),
+            last_seen: "2026-01-01T00:00:00Z".to_owned(),
+        };
+        let json = written(&v1::VectorPatch {
+            since: 0,
+            revision: 9,
+            segments: Vec::new(),
+            clusters: Vec::new(),
+            chains: vec![
+                chain(0, v1::ChainKind::Obstacle, &square),
+                chain(1, v1::ChainKind::Polyline, &square[..3]),
+            ],
+            removed: v1::Removed::default(),
+        });
+        let [obstacle, line] = &json["features"].as_array().unwrap()[..] else { panic!() };
+        assert_eq!(obstacle["geometry"]["type"], "Polygon");
+        let [a, b, c, d] = square;
+        assert_eq!(obstacle["geometry"]["coordinates"], serde_json::json!([[d, c, b, a, d]]));
+        assert_eq!(obstacle["properties"]["kind"], "chain");
+        assert_eq!(obstacle["properties"]["shape"], "obstacle");
+        assert_eq!(line["geometry"]["type"], "LineString");
+        assert_eq!(line["geometry"]["coordinates"], serde_json::json!([a, b, c]));
+        assert_eq!(line["id"], "0190a000-0000-7000-8000-000000000001-3.1");
     }
 
     #[test]

@@ -20,7 +20,7 @@ pub const CONTRIBUTION: &str = "/api/v1/sites/{site}/levels/{level}/contribution
 pub const REVERTS: &str = "/api/v1/sites/{site}/levels/{level}/reverts";
 /// `GET, DELETE`: one revert; deleting it puts back what it took out.
 pub const REVERT: &str = "/api/v1/sites/{site}/levels/{level}/reverts/{id}";
-/// `GET`: segments and clusters.
+/// `GET`: segments, clusters and chains.
 pub const VECTOR: &str = "/api/v1/sites/{site}/levels/{level}/vector";
 /// `GET`: changed tiles.
 pub const RASTER: &str = "/api/v1/sites/{site}/levels/{level}/raster";

@@ -19,7 +19,9 @@ pub use contribution::{
     TilePatch,
 };
 pub use event::LevelEvent;
-pub use features::{Cluster, EndKind, Facing, Segment, SensorClass, SolidInterval};
+pub use features::{
+    Chain, ChainKind, Cluster, EndKind, Facing, Segment, SensorClass, SolidInterval,
+};
 pub use level::{Bounds, Counts, LevelDescription, NewLevel};
 pub use patch::{Patch, RasterChanges, Removed, TileAddress, TileEvidence, VectorPatch};
 pub use receipt::{Receipt, UploadAnswer};

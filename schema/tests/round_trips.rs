@@ -12,12 +12,13 @@ use mapfold_map::raster::{
     EvidencePatch, SensorClass, TILE_CELLS, Tile, TileIndex, TileKey, TilePatch,
 };
 use mapfold_map::vector::{
-    Cluster, EndKind, Facing, ObservedCluster, ObservedEnd, ObservedSegment, Segment, SolidInterval,
+    Chain, ChainId, ChainKind, Cluster, EndKind, Facing, ObservedCluster, ObservedEnd,
+    ObservedSegment, Segment, SolidInterval, Vertex,
 };
 use mapfold_schema::border::{
-    DEFAULT_LIMITS, Target, Violation, check_contribution, feature_id, map_cluster, map_patch,
-    map_segment, map_tile, parse_feature_id, wire_cluster, wire_contribution, wire_patch,
-    wire_segment, wire_tile,
+    DEFAULT_LIMITS, Target, Violation, chain_id, check_contribution, feature_id, map_chain,
+    map_cluster, map_patch, map_segment, map_tile, parse_chain_id, parse_feature_id, wire_chain,
+    wire_cluster, wire_contribution, wire_patch, wire_segment, wire_tile,
 };
 use mapfold_schema::codec::{self, CBOR, JSON};
 use mapfold_schema::digest::content_digest;
@@ -145,6 +146,28 @@ fn cluster() -> impl Strategy<Value = Cluster> {
         })
 }
 
+fn chain_key() -> impl Strategy<Value = ChainId> {
+    (feature(), any::<i16>()).prop_map(|(segment, piece)| ChainId { segment, piece })
+}
+
+fn chain() -> impl Strategy<Value = Chain> {
+    let vertex =
+        (point(1e4), covariance([0.1, 0.1])).prop_map(|(at, covariance)| Vertex { at, covariance });
+    (
+        (0..3_usize, vec((vertex, feature()), 3..9)),
+        (any::<u32>(), robots(), INSTANTS_US, INSTANTS_US),
+    )
+        .prop_map(|((kind, corners), rest)| {
+            let (looks, robots, first_seen_us, last_seen_us) = rest;
+            let kind = [ChainKind::Polyline, ChainKind::Obstacle, ChainKind::Room][kind];
+            let (vertices, mut segments): (Vec<_>, Vec<_>) = corners.into_iter().unzip();
+            if !kind.is_closed() {
+                segments.pop();
+            }
+            Chain { kind, vertices, segments, looks, robots, first_seen_us, last_seen_us }
+        })
+}
+
 /// Cells in runs, as evidence is.
 fn cells<T: Copy + Default + std::fmt::Debug + 'static>(
     value: impl Strategy<Value = T>,
@@ -169,12 +192,22 @@ fn patch() -> impl Strategy<Value = Patch> {
     (
         btree_map(feature(), segment().prop_map(Arc::new), 0..3),
         btree_map(feature(), cluster().prop_map(Arc::new), 0..3),
+        btree_map(chain_key(), chain().prop_map(Arc::new), 0..3),
         btree_map(key(), tile, 0..3),
-        (vec(feature(), 0..3), vec(feature(), 0..3), vec(key(), 0..3)),
+        (vec(feature(), 0..3), vec(feature(), 0..3), vec(chain_key(), 0..3), vec(key(), 0..3)),
     )
-        .prop_map(|(segments, clusters, tiles, removed)| {
-            let (removed_segments, removed_clusters, removed_tiles) = removed;
-            Patch { segments, clusters, tiles, removed_segments, removed_clusters, removed_tiles }
+        .prop_map(|(segments, clusters, chains, tiles, removed)| {
+            let (removed_segments, removed_clusters, removed_chains, removed_tiles) = removed;
+            Patch {
+                segments,
+                clusters,
+                chains,
+                tiles,
+                removed_segments,
+                removed_clusters,
+                removed_chains,
+                removed_tiles,
+            }
         })
 }
 
@@ -261,6 +294,15 @@ proptest! {
         let (id_back, back) = map_segment(&travelled(&wire)).map_err(fail)?;
         prop_assert_eq!(&(id_back, &back), &(id, &segment));
         prop_assert_eq!(codec::to_cbor(&wire_segment(&id_back, &back)), codec::to_cbor(&wire));
+    }
+
+    #[test]
+    fn a_chain_survives(id in chain_key(), chain in chain()) {
+        let wire = wire_chain(&id, &chain);
+        let (id_back, back) = map_chain(&travelled(&wire)).map_err(fail)?;
+        prop_assert_eq!(&(id_back, &back), &(id, &chain));
+        prop_assert_eq!(codec::to_cbor(&wire_chain(&id_back, &back)), codec::to_cbor(&wire));
+        prop_assert_eq!(parse_chain_id(&chain_id(&id)), Some(id));
     }
 
     #[test]
@@ -411,6 +453,51 @@ fn a_mirror_refuses_what_it_could_not_keep_exactly() {
     }
 }
 
+/// The same for a chain.
+type ChainRefusal = (&'static str, &'static str, fn(&mut v1::Chain));
+
+#[test]
+fn a_mirror_refuses_chains_that_do_not_hang_together() {
+    let segment = FeatureId { contribution: ContributionId([7; 16]), index: 1 };
+    let corner = |x: f64, y: f64| Vertex {
+        at: Point::new(x, y),
+        covariance: Covariance::from_variances([1e-4, 1e-4]),
+    };
+    let chain = Chain {
+        kind: ChainKind::Room,
+        vertices: vec![corner(0.0, 0.0), corner(2.0, 0.0), corner(2.0, 1.0)],
+        segments: vec![segment; 3],
+        looks: 2,
+        robots: vec!["r1".into()],
+        first_seen_us: 0,
+        last_seen_us: 1,
+    };
+    let refused = |change: fn(&mut v1::Chain)| {
+        let mut wire = wire_chain(&ChainId { segment, piece: -1 }, &chain);
+        change(&mut wire);
+        map_chain(&wire).map_err(|v| (v.code, v.pointer)).err()
+    };
+    assert_eq!(refused(|_| ()), None);
+    let cases: [ChainRefusal; 9] = [
+        ("bad_chain_id", "/id", |c| c.id.push('x')),
+        ("bad_chain_id", "/id", |c| c.id = c.segments[0].clone()),
+        ("kind_mismatch", "/closed", |c| c.closed = false),
+        ("too_few", "/vertices_m", |c| {
+            c.vertices_m.pop();
+            c.covariances.pop();
+            c.segments.pop();
+        }),
+        ("not_finite", "/vertices_m/1/0", |c| c.vertices_m[1][0] = f64::NAN),
+        ("wrong_count", "/covariances", |c| c.covariances.truncate(2)),
+        ("not_positive_semidefinite", "/covariances/2", |c| c.covariances[2][0][0] = -1.0),
+        ("wrong_count", "/segments", |c| c.segments.truncate(2)),
+        ("bad_feature_id", "/segments/0", |c| c.segments[0].clear()),
+    ];
+    for (code, pointer, change) in cases {
+        assert_eq!(refused(change), Some((code.to_owned(), pointer.to_owned())));
+    }
+}
+
 #[test]
 fn a_patch_names_the_places_of_its_faults() {
     let tile = |runs| v1::TileEvidence { sensor: v1::SensorClass::Sonar, x: 0, y: 0, runs };
@@ -420,6 +507,7 @@ fn a_patch_names_the_places_of_its_faults() {
         more: false,
         segments: vec![],
         clusters: vec![],
+        chains: vec![],
         tiles: vec![
             tile(vec![0, 1, 5]),
             tile(vec![0, 1, 5]),

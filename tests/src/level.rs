@@ -6,7 +6,7 @@ use std::time::Duration;
 use mapfold_schema::codec::JSON;
 use mapfold_schema::route;
 use mapfold_schema::v1::{
-    Cluster, ContributionEntry, ContributionPage, ContributionRecord, IssuedToken,
+    Chain, Cluster, ContributionEntry, ContributionPage, ContributionRecord, IssuedToken,
     LevelDescription, NewLevel, NewRevert, NewRobot, NewSite, Patch, RasterChanges, Revert,
     Segment, SensorKind, SensorProfile, TileAddress, TileEvidence, VectorPatch,
 };
@@ -229,6 +229,8 @@ pub struct Replica {
     pub segments: BTreeMap<String, Segment>,
     /// Clusters by id.
     pub clusters: BTreeMap<String, Cluster>,
+    /// Chains by id.
+    pub chains: BTreeMap<String, Chain>,
     /// Tiles by layer and place.
     pub tiles: BTreeMap<TileAddress, TileEvidence>,
 }
@@ -242,11 +244,15 @@ impl Replica {
         for id in &patch.removed.clusters {
             self.clusters.remove(id);
         }
+        for id in &patch.removed.chains {
+            self.chains.remove(id);
+        }
         for at in &patch.removed.tiles {
             self.tiles.remove(at);
         }
         self.segments.extend(patch.segments.into_iter().map(|s| (s.id.clone(), s)));
         self.clusters.extend(patch.clusters.into_iter().map(|c| (c.id.clone(), c)));
+        self.chains.extend(patch.chains.into_iter().map(|c| (c.id.clone(), c)));
         self.tiles.extend(
             patch
                 .tiles

@@ -16,6 +16,7 @@
 //!   programs, the network between them, and what they answer.
 //! * [`trial`]: a log played as a fleet into a fresh server, and what came of it.
 //! * [`range`]: simulated heads, their calibration, and how well their ranges are corrected.
+//! * [`figure`]: a hallway's map as a picture.
 //! * [`evaluation`], [`speed`], [`report`]: `mapfold-evaluate`, which writes tables between markers
 //!   into a page of text.
 
@@ -25,6 +26,7 @@ pub mod coverage;
 pub mod database;
 pub mod error;
 pub mod evaluation;
+pub mod figure;
 pub mod fleet;
 pub mod floor;
 pub mod growth;

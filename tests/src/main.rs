@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use mapfold_tests::{evaluation, growth, honesty, range, speed};
+use mapfold_tests::{evaluation, figure, growth, honesty, range, speed};
 
 /// Measures Mapfold and rewrites the tables of a report between their markers.
 #[derive(Debug, Parser)]
@@ -51,6 +51,12 @@ enum Command {
         #[arg(long, value_name = "DIR")]
         data: Option<PathBuf>,
     },
+    /// Draws a hallway's vector map from a few scans of the committed log
+    Figure {
+        /// The SVG to write
+        #[arg(long, value_name = "FILE")]
+        out: PathBuf,
+    },
     /// Gathers the figures that Criterion has left in the target folder
     Benches {
         /// The page with the markers `benches`
@@ -71,6 +77,7 @@ async fn main() -> ExitCode {
         Command::Range { report } => range::evaluate(&report, &range::FULL),
         Command::Honesty { report } => honesty::table(&report),
         Command::Growth { report, data } => growth::tables(&report, data.as_deref()),
+        Command::Figure { out } => figure::write(&out).await.map(|()| Vec::new()),
         Command::Benches { report, criterion } => speed::benches(&report, &criterion),
     };
     match done {

@@ -71,6 +71,9 @@ async fn a_mirror_that_follows_patches_equals_a_full_fetch() -> Result<(), Error
         assert!(cbor.segments == segments, "segments differ in {accept}");
         let clusters = whole.clusters.into_iter().map(|c| (c.id.clone(), c)).collect();
         assert!(cbor.clusters == clusters, "clusters differ in {accept}");
+        assert!(!whole.chains.is_empty(), "no walls meet");
+        let chains = whole.chains.into_iter().map(|c| (c.id.clone(), c)).collect();
+        assert!(cbor.chains == chains, "chains differ in {accept}");
         let raster = level.raster(0, accept).await?;
         let addresses: BTreeSet<TileAddress> = raster.tiles.iter().copied().collect();
         assert!(addresses.iter().eq(cbor.tiles.keys()), "tiles differ in {accept}");
@@ -88,9 +91,11 @@ async fn a_mirror_that_follows_patches_equals_a_full_fetch() -> Result<(), Error
         let patch = level.patch(description.revision, PAGE, accept).await?;
         assert_eq!((patch.since, patch.revision), (description.revision, description.revision));
         assert!(!patch.more && patch.segments.is_empty() && patch.clusters.is_empty());
+        assert!(patch.chains.is_empty());
         assert!(patch.tiles.is_empty() && patch.removed == Removed::default());
         let vector = level.vector(description.revision, accept).await?;
         assert!(vector.segments.is_empty() && vector.clusters.is_empty());
+        assert!(vector.chains.is_empty());
         assert!(level.raster(description.revision, accept).await?.tiles.is_empty());
     }
     Ok(())

@@ -150,7 +150,8 @@ export interface paths {
         /**
          * The whole map as a file: `geojson`, or `nav2` (a zip of `map.yaml` and `map.pgm`).
          * @description Equal maps give equal bytes. GeoJSON has a `LineString` for each solid part of a segment (with
-         *     the feature id `<segment id>#<n>`) and a `Polygon` for each cluster, in metres of the level.
+         *     the feature id `<segment id>#<n>`), a `Polygon` for each cluster and the one or the other for each
+         *     chain, in metres of the level.
          */
         get: operations["export"];
         put?: never;
@@ -306,7 +307,7 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Segments and clusters that changed after `since`, and the ids of those that are no more.
+         * Segments, clusters and chains that changed after `since`, and the ids of those that are no more.
          * @description `since=0` gives all. With a `bbox`: what touches it; what changed and lies outside of it is then
          *     among the removed, because it may have lain inside. As GeoJSON, the coordinates are metres of
          *     the level's frame.
@@ -454,6 +455,40 @@ export interface components {
              */
             min_y_m: number;
         };
+        /**
+         * @description Walls that meet at their ends, in the level frame, with free space on the left of whoever walks
+         *     along them. Never meets itself.
+         */
+        Chain: {
+            /** @description Whether the last vertex is joined to the first: not for a polyline. */
+            closed: boolean;
+            /** @description Covariance of each vertex, safe for any correlation of what its walls may share. */
+            covariances: number[][][];
+            /** @description Earliest look. */
+            first_seen: string;
+            /** @description `<segment id>.<piece>` of the piece of wall that it is called after. */
+            id: string;
+            /** @description What it encloses. */
+            kind: components["schemas"]["ChainKind"];
+            /** @description Latest look. */
+            last_seen: string;
+            /**
+             * Format: int32
+             * @description The least quality of its segments: each part of it was seen in so many distinct looks.
+             */
+            quality: number;
+            /** @description Who saw any of it. */
+            robots: string[];
+            /** @description The segments that its edges lie on, edge by edge. */
+            segments: string[];
+            /** @description The vertices in order, [x, y]; of a closed chain at least 3, and the first is not repeated. */
+            vertices_m: number[][];
+        };
+        /**
+         * @description What a chain encloses.
+         * @enum {string}
+         */
+        ChainKind: "polyline" | "obstacle" | "room";
         /** @description How many things of a kind would change. */
         ChangeCounts: {
             /**
@@ -477,7 +512,7 @@ export interface components {
          * @enum {string}
          */
         ChangeKind: "new" | "changed" | "removed";
-        /** @description A segment or a cluster that would change. */
+        /** @description A segment, cluster or chain that would change. */
         ChangedFeature: {
             /** @description What would become of it. */
             change: components["schemas"]["ChangeKind"];
@@ -605,6 +640,11 @@ export interface components {
         Counts: {
             /**
              * Format: int64
+             * @description Published chains.
+             */
+            chains?: number;
+            /**
+             * Format: int64
              * @description Published clusters.
              */
             clusters: number;
@@ -650,7 +690,7 @@ export interface components {
          * @description Kinds of features.
          * @enum {string}
          */
-        FeatureKind: "segment" | "cluster";
+        FeatureKind: "segment" | "cluster" | "chain";
         /** @description A new token. The secret is shown this once. */
         IssuedToken: {
             /** @description Public identity, for `token revoke`. */
@@ -740,7 +780,7 @@ export interface components {
             acts?: number;
             /**
              * Format: int32
-             * @description Number of changed or removed segments and clusters.
+             * @description Number of changed or removed segments, clusters and chains.
              */
             features: number;
             /**
@@ -884,6 +924,8 @@ export interface components {
         };
         /** @description `GET L/patches`: all that changed after `since`, in pages. */
         Patch: {
+            /** @description New or changed chains. */
+            chains?: components["schemas"]["Chain"][];
             /** @description New or changed clusters. */
             clusters: components["schemas"]["Cluster"][];
             /** @description Whether there is more to ask for right now. */
@@ -1017,6 +1059,8 @@ export interface components {
         };
         /** @description Identities of what is no more. */
         Removed: {
+            /** @description Chains. */
+            chains?: string[];
             /** @description Clusters. */
             clusters?: string[];
             /** @description Segments. */
@@ -1072,6 +1116,8 @@ export interface components {
         /** @description What a revert, or undoing one, would change. */
         RevertPreview: {
             bounds?: components["schemas"]["Bounds"] | null;
+            /** @description Chains. */
+            chains?: components["schemas"]["ChangeCounts"];
             /** @description Clusters. */
             clusters: components["schemas"]["ChangeCounts"];
             /**
@@ -1079,7 +1125,7 @@ export interface components {
              * @description Contributions that it covers.
              */
             contributions: number;
-            /** @description The segments and clusters that would change, at most 200. */
+            /** @description The segments, clusters and chains that would change, at most 200. */
             features: components["schemas"]["ChangedFeature"][];
             /** @description Whether there are more of them. */
             more_features: boolean;
@@ -1407,8 +1453,10 @@ export interface components {
             /** @description It is not. */
             problem: components["schemas"]["Problem"];
         };
-        /** @description `GET L/vector`: segments and clusters that changed after `since`. */
+        /** @description `GET L/vector`: segments, clusters and chains that changed after `since`. */
         VectorPatch: {
+            /** @description New or changed chains. */
+            chains?: components["schemas"]["Chain"][];
             /** @description New or changed clusters. */
             clusters: components["schemas"]["Cluster"][];
             /** @description What is no more. */
@@ -2015,7 +2063,7 @@ export interface operations {
                 /** @description Only what changed after this revision; 0 gives all. */
                 since?: number;
                 /**
-                 * @description About how many things (segments, clusters, tiles, removals) at once, at most 20000; 2000 if
+                 * @description About how many things (segments, clusters, chains, tiles, removals) at once, at most 20000; 2000 if
                  *     absent. A revision is never cut in two.
                  */
                 limit?: number;

@@ -3,11 +3,11 @@
 
 import { boxAround, union, type Box } from "./geometry";
 import type { TileMark } from "./pyramid";
-import type { Cluster, RasterChanges, Segment, TileAddress, VectorPatch } from "./wire";
+import type { Chain, Cluster, RasterChanges, Segment, TileAddress, VectorPatch } from "./wire";
 
-/** Segments, clusters and tiles of one level. */
+/** Segments, clusters, chains and tiles of one level. */
 export interface Content {
-  /** The revision that segments and clusters are at. */
+  /** The revision that segments, clusters and chains are at. */
   vectorRevision: number;
   /** The revision that the tiles are at. */
   rasterRevision: number;
@@ -15,6 +15,7 @@ export interface Content {
   epoch: number;
   segments: ReadonlyMap<string, Segment>;
   clusters: ReadonlyMap<string, Cluster>;
+  chains: ReadonlyMap<string, Chain>;
   /** By `tileKey`; tiles that hold no evidence any more stay, marked, as their pictures must change too. */
   tiles: ReadonlyMap<string, TileMark>;
 }
@@ -26,6 +27,7 @@ export const NO_CONTENT: Content = {
   epoch: 0,
   segments: new Map(),
   clusters: new Map(),
+  chains: new Map(),
   tiles: new Map(),
 };
 
@@ -59,6 +61,7 @@ export function withVector(content: Content, patch: VectorPatch): Content {
     vectorRevision: patch.revision,
     segments: patched(base.segments, patch.segments, patch.removed.segments ?? []),
     clusters: patched(base.clusters, patch.clusters, patch.removed.clusters ?? []),
+    chains: patched(base.chains, patch.chains ?? [], patch.removed.chains ?? []),
   };
 }
 

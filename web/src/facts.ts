@@ -6,7 +6,7 @@
 //   data-revision         the revision that is painted
 //   data-segments         segments that are painted (on the screen or beside it)
 //   data-pieces-painted   straight pieces of them that are on the screen
-//   data-clusters, data-robots
+//   data-clusters, data-chains, data-robots
 //   data-tiles            tiles that hold evidence
 //   data-tiles-loaded     pictures of the raster that are loaded
 //   data-tiles-pending    pictures on the screen that are missing or stale
@@ -41,6 +41,7 @@ export function createFacts(root: HTMLElement): Facts {
       say("segments", content.segments.size);
       say("piecesPainted", piecesPainted);
       say("clusters", content.clusters.size);
+      say("chains", content.chains.size);
       say("robots", robotsHere(state).length);
       say("tiles", tiles(content));
       say("tilesLoaded", picturesLoaded);

@@ -1,7 +1,7 @@
 // Lines, ellipses and boxes of the level frame: metres, x right, y up. Free functions over plain
 // arrays; knows nothing of pixels.
 
-import type { Cluster, Matrix2, Matrix3, Segment } from "./wire";
+import type { Chain, Cluster, Matrix2, Matrix3, Segment } from "./wire";
 
 /** A place in the level frame, [x, y] in metres. */
 export type Point = readonly [number, number];
@@ -103,6 +103,39 @@ export function hullContains(hull: readonly Point[], point: Point): boolean {
     const to = hull[(index + 1) % hull.length] ?? from;
     return (to[0] - from[0]) * (point[1] - from[1]) - (to[1] - from[1]) * (point[0] - from[0]) >= 0;
   });
+}
+
+/** The edges of a chain. */
+export function edgesOf(chain: Chain): Piece[] {
+  const { vertices_m: vertices, closed } = chain;
+  const edges: Piece[] = [];
+  for (const [index, from] of vertices.entries()) {
+    const to = vertices[index + 1] ?? (closed ? vertices[0] : undefined);
+    if (to !== undefined) edges.push([from[0], from[1], to[0], to[1]]);
+  }
+  return edges;
+}
+
+/** Area of a ring, whichever way it runs. */
+export function areaOf(ring: readonly Point[]): number {
+  let doubled = 0;
+  for (const [index, from] of ring.entries()) {
+    const to = ring[(index + 1) % ring.length] ?? from;
+    doubled += from[0] * to[1] - from[1] * to[0];
+  }
+  return Math.abs(doubled) / 2;
+}
+
+/** Whether a ring of any shape holds a point: a ray from it crosses the ring an odd number of times. */
+export function ringContains(ring: readonly Point[], point: Point): boolean {
+  let inside = false;
+  for (const [index, from] of ring.entries()) {
+    const to = ring[(index + 1) % ring.length] ?? from;
+    if (from[1] > point[1] === to[1] > point[1]) continue;
+    const x = from[0] + ((point[1] - from[1]) * (to[0] - from[0])) / (to[1] - from[1]);
+    if (point[0] < x) inside = !inside;
+  }
+  return inside;
 }
 
 /** The smallest box around two boxes; a missing one counts for nothing. */

@@ -1,7 +1,7 @@
 // The layers of the map, from below to above.
 
 /** Names of layers, as in permalinks. */
-export const LAYER_NAMES = ["raster", "grid", "clusters", "segments", "robots"] as const;
+export const LAYER_NAMES = ["raster", "grid", "clusters", "chains", "segments", "robots"] as const;
 
 export type LayerName = (typeof LAYER_NAMES)[number];
 
@@ -18,6 +18,7 @@ export const DEFAULT_LAYERS: Layers = {
   raster: { on: true, opacity: 1 },
   grid: { on: false, opacity: 1 },
   clusters: { on: true, opacity: 1 },
+  chains: { on: true, opacity: 1 },
   segments: { on: true, opacity: 1 },
   robots: { on: true, opacity: 1 },
 };
@@ -27,6 +28,7 @@ export const LAYER_TITLES: Readonly<Record<LayerName, string>> = {
   raster: "Occupancy",
   grid: "Grid",
   clusters: "Clusters",
+  chains: "Polylines and polygons",
   segments: "Segments",
   robots: "Robots",
 };

@@ -22,6 +22,8 @@ export interface Theme {
   robots: readonly string[];
   /** What more than one robot saw. */
   several: string;
+  /** Chains: the band beneath their walls, and the inside of polygons. */
+  chain: string;
   /** What a robot that is not heard is drawn in. */
   silent: string;
   grid: string;
@@ -39,6 +41,7 @@ export const LIGHT: Theme = {
   unknown: "#e6eaee",
   robots: ["#0072b2", "#cc3366", "#556600", "#9966ff", "#660077", "#1100bb"],
   several: "#1f2933",
+  chain: "#0f8f7a",
   silent: "#7b8794",
   grid: "rgba(31, 41, 51, 0.10)",
   gridAxis: "rgba(31, 41, 51, 0.38)",
@@ -53,6 +56,7 @@ export const DARK: Theme = {
   unknown: "#12161b",
   robots: ["#56b4e9", "#ff5599", "#77ee77", "#9966ff", "#009966", "#e69f00"],
   several: "#f1f5f9",
+  chain: "#3fd0b6",
   silent: "#8b98a5",
   grid: "rgba(241, 245, 249, 0.10)",
   gridAxis: "rgba(241, 245, 249, 0.40)",

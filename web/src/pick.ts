@@ -1,7 +1,7 @@
-// What lies under a point of the map: the nearest of what is shown, robots before walls before
-// clusters.
+// What lies under a point of the map: the nearest of what is shown, robots before the corners of
+// chains before walls before clusters before the rest of chains.
 
-import { distanceToPiece, hullContains, piecesOf, type Point } from "./geometry";
+import { distanceToPiece, edgesOf, hullContains, piecesOf, ringContains, type Point } from "./geometry";
 import { robotsHere, type Selection, type State } from "./state";
 
 /** How far from a thing still counts as on it. */
@@ -12,8 +12,10 @@ const LINE_PX = 8;
 export function pick(state: State, at: Point, resolution: number): Selection | null {
   return (
     (state.layers.robots.on ? pickRobot(state, at, ROBOT_PX * resolution) : null) ??
+    (state.layers.chains.on ? pickCorner(state, at, LINE_PX * resolution) : null) ??
     (state.layers.segments.on ? pickSegment(state, at, LINE_PX * resolution) : null) ??
-    (state.layers.clusters.on ? pickCluster(state, at, LINE_PX * resolution) : null)
+    (state.layers.clusters.on ? pickCluster(state, at, LINE_PX * resolution) : null) ??
+    (state.layers.chains.on ? pickChain(state, at, LINE_PX * resolution) : null)
   );
 }
 
@@ -49,6 +51,25 @@ function pickCluster(state: State, at: Point, withinM: number): Selection | null
     found.push({ id, distanceM: hullContains(hull, at) ? 0 : Math.min(...edges) });
   }
   return nearest(found, { kind: "cluster", withinM });
+}
+
+function pickCorner(state: State, at: Point, withinM: number): Selection | null {
+  const found: Found[] = [];
+  for (const { id, vertices_m: vertices } of state.content.chains.values()) {
+    for (const [x, y] of vertices) found.push({ id, distanceM: Math.hypot(x - at[0], y - at[1]) });
+  }
+  return nearest(found, { kind: "chain", withinM });
+}
+
+/** By its edges; an obstacle, in which nothing else can be, also from inside. */
+function pickChain(state: State, at: Point, withinM: number): Selection | null {
+  const found: Found[] = [];
+  for (const chain of state.content.chains.values()) {
+    const isInside = chain.kind === "obstacle" && ringContains(chain.vertices_m, at);
+    const distances = edgesOf(chain).map((edge) => distanceToPiece(at, edge));
+    found.push({ id: chain.id, distanceM: isInside ? 0 : Math.min(...distances) });
+  }
+  return nearest(found, { kind: "chain", withinM });
 }
 
 interface Found {

@@ -35,7 +35,7 @@ export type Link =
 
 /** What the operator has chosen on the map. */
 export interface Selection {
-  kind: "segment" | "cluster" | "robot";
+  kind: "segment" | "cluster" | "chain" | "robot";
   id: string;
 }
 
@@ -230,7 +230,8 @@ function forgetSelectionThatIsGone(state: State): State {
   const { selection, content } = state;
   const gone =
     (selection?.kind === "segment" && !content.segments.has(selection.id)) ||
-    (selection?.kind === "cluster" && !content.clusters.has(selection.id));
+    (selection?.kind === "cluster" && !content.clusters.has(selection.id)) ||
+    (selection?.kind === "chain" && !content.chains.has(selection.id));
   return gone ? { ...state, selection: null } : state;
 }
 

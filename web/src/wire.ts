@@ -35,7 +35,11 @@ export type Cluster = Exactly<
   Wire["Cluster"],
   { hull_m: [number, number][]; centroid_m: [number, number]; covariance: Matrix2 }
 >;
-export type VectorPatch = Exactly<Wire["VectorPatch"], { segments: Segment[]; clusters: Cluster[] }>;
+export type Chain = Exactly<Wire["Chain"], { vertices_m: [number, number][]; covariances: Matrix2[] }>;
+export type VectorPatch = Exactly<
+  Wire["VectorPatch"],
+  { segments: Segment[]; clusters: Cluster[]; chains?: Chain[] }
+>;
 
 export type LastPose = Exactly<Wire["LastPose"], { covariance: Matrix3 }>;
 export type RobotDescription = Exactly<Wire["RobotDescription"], { last_pose?: LastPose | null }>;

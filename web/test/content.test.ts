@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { boundsOf, NO_CONTENT, tileCount, withRaster, withVector } from "../src/content";
-import { cluster, rasterChanges, segment, tile, vectorPatch } from "./samples";
+import { chain, cluster, rasterChanges, segment, tile, vectorPatch } from "./samples";
 
 const FIRST = withVector(NO_CONTENT, vectorPatch(0, 4, { segments: [segment("a"), segment("b")], clusters: [cluster("c")] }));
 
@@ -17,6 +17,14 @@ describe("a vector patch", () => {
     expect(next.segments.get("a")?.quality).toBe(9);
     expect(next.clusters.size).toBe(0);
     expect(next.vectorRevision).toBe(6);
+  });
+
+  it("brings chains and takes them away", () => {
+    const joined = withVector(FIRST, vectorPatch(4, 5, { chains: [chain("a.0"), chain("b.0")] }));
+    expect([...joined.chains.keys()]).toEqual(["a.0", "b.0"]);
+    const parted = withVector(joined, vectorPatch(5, 6, { removed: { chains: ["a.0"] } }));
+    expect([...parted.chains.keys()]).toEqual(["b.0"]);
+    expect(parted.segments).toBe(FIRST.segments);
   });
 
   it("leaves the content before it as it was", () => {

@@ -1,19 +1,22 @@
 import { describe, expect, it } from "vitest";
 import {
   angleSd,
+  areaOf,
   boxAround,
   distanceToPiece,
+  edgesOf,
   ellipse95,
   hullContains,
   middleOf,
   offsetSd,
   piecesOf,
   pointOnLine,
+  ringContains,
   shareOf,
   widened,
 } from "../src/geometry";
 import { createRandom, normal } from "./mock/random.mjs";
-import { cluster, segment } from "./samples";
+import { chain, cluster, segment } from "./samples";
 
 describe("lines", () => {
   it("run along the normal turned left, as in map/src/geometry/line.rs", () => {
@@ -116,6 +119,18 @@ describe("distances and boxes", () => {
     expect(hullContains(hull, [5.5, 5.9])).toBe(true);
     expect(hullContains(hull, [6.1, 5.5])).toBe(false);
     expect(hullContains([[0, 0], [1, 1]], [0.5, 0.5])).toBe(false);
+  });
+
+  it("knows the edges, the area and the inside of a ring", () => {
+    const box = chain("c");
+    expect(edgesOf(box)).toHaveLength(4);
+    expect(edgesOf(box).at(-1)).toEqual([7, 5, 5, 5]);
+    expect(edgesOf({ ...box, closed: false })).toHaveLength(3);
+    expect(areaOf(box.vertices_m)).toBe(4);
+    const hook: [number, number][] = [[0, 0], [4, 0], [4, 4], [3, 4], [3, 1], [0, 1]];
+    expect(areaOf(hook)).toBe(7);
+    expect(ringContains(hook, [3.5, 3])).toBe(true);
+    expect(ringContains(hook, [1, 3])).toBe(false);
   });
 
   it("bounds segments and clusters together", () => {

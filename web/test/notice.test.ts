@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import { noticeOf, warningOf } from "../src/notice";
 import { describe as describeSelection } from "../src/panels/selection_card";
 import { update, type Event, type State } from "../src/state";
-import { after, cluster, level, NOON_MS, ON_GROUND, robot, segment, vectorPatch } from "./samples";
+import { after, chain, cluster, level, NOON_MS, ON_GROUND, robot, segment, vectorPatch } from "./samples";
 
 const ORIGIN = "http://127.0.0.1:7171";
 const ground = after(...ON_GROUND);
@@ -49,8 +49,8 @@ describe("above a map", () => {
 });
 
 describe("what is chosen", () => {
-  const filled = then(ground, { kind: "vector", patch: vectorPatch(0, 3, { segments: [segment("w")], clusters: [cluster("c")] }) });
-  const lines = (kind: "segment" | "cluster" | "robot", id: string, state = filled): Record<string, string> =>
+  const filled = then(ground, { kind: "vector", patch: vectorPatch(0, 3, { segments: [segment("w")], clusters: [cluster("c")], chains: [chain("w.0")] }) });
+  const lines = (kind: "segment" | "cluster" | "chain" | "robot", id: string, state = filled): Record<string, string> =>
     Object.fromEntries(describeSelection(then(state, { kind: "select", selection: { kind, id } }))?.lines ?? []);
 
   it("is told of a segment: quality, robots, sds, times", () => {
@@ -64,6 +64,18 @@ describe("what is chosen", () => {
       Ends: "corner, free end",
     });
     expect(lines("segment", "w")["Last seen"]).toMatch(/^2026-11-2\d \d\d:\d\d:00$/);
+  });
+
+  it("is told of a chain, and of a wall's part in it", () => {
+    expect(lines("chain", "w.0")).toMatchObject({
+      What: "obstacle of 4 walls, free outside",
+      Quality: "at least 2 looks each",
+      Length: "8 m",
+      Area: "4.0 m²",
+      // 2 cm times the root of 5.99.
+      Vertices: "4, 95 % within 4.9 cm",
+    });
+    expect(lines("segment", "w")["Part of"]).toBe("obstacle of 4 walls");
   });
 
   it("is told of a cluster", () => {

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { pick } from "../src/pick";
 import { update, type State } from "../src/state";
-import { after, cluster, ON_GROUND, segment, vectorPatch } from "./samples";
+import { after, chain, cluster, ON_GROUND, segment, vectorPatch } from "./samples";
 
 /** The wall x = 2, y 1 to 4; another wall on the same line, y 10 to 12; a cluster; a robot at the origin. */
 const state: State = [
@@ -40,6 +40,23 @@ describe("picking", () => {
     expect(pick(state, [5.5, 5.5], RESOLUTION)).toEqual({ kind: "cluster", id: "thing" });
     expect(pick(state, [6.3, 5.5], RESOLUTION)).toEqual({ kind: "cluster", id: "thing" });
     expect(pick(state, [6.5, 5.5], RESOLUTION)).toBeNull();
+  });
+
+  it("finds a chain at its corners, along its edges and inside an obstacle, below all else", () => {
+    const wall = segment("w", { rho_m: 5, alpha_rad: Math.PI / 2, solid: [{ from_m: -7, to_m: -5, ends: ["corner", "corner"] }] });
+    const patch = vectorPatch(0, 2, { segments: [wall], chains: [chain("box")] });
+    const boxed = update(state, { kind: "vector", patch });
+    expect(pick(boxed, [5.1, 4.9], RESOLUTION)).toEqual({ kind: "chain", id: "box" });
+    expect(pick(boxed, [6, 5.1], RESOLUTION)).toEqual({ kind: "segment", id: "w" });
+    expect(pick(boxed, [5.1, 6], RESOLUTION)).toEqual({ kind: "chain", id: "box" });
+    expect(pick(boxed, [6, 6], RESOLUTION)).toEqual({ kind: "chain", id: "box" });
+    const room = update(boxed, { kind: "vector", patch: vectorPatch(2, 3, { chains: [chain("box", { kind: "room" })] }) });
+    expect(pick(room, [6, 6], RESOLUTION)).toBeNull();
+    const open = update(boxed, { kind: "vector", patch: vectorPatch(2, 3, { chains: [chain("box", { kind: "polyline", closed: false })] }) });
+    expect(pick(open, [6, 5.1], RESOLUTION)?.kind).toBe("segment");
+    expect(pick(open, [5.1, 6], RESOLUTION)?.id).toBe("box");
+    const hidden = update(boxed, { kind: "layer", name: "chains", setting: { on: false } });
+    expect(pick(hidden, [6, 6], RESOLUTION)).toBeNull();
   });
 
   it("prefers robots to what is below them", () => {

@@ -4,6 +4,7 @@ import type { Permalink } from "../src/permalink";
 import { DEFAULT_LAYERS } from "../src/layers";
 import { initialState, update, type Event, type State } from "../src/state";
 import type {
+  Chain,
   Cluster,
   ContributionEntry,
   LastPose,
@@ -65,6 +66,31 @@ export function cluster(id: string, fields: Partial<Cluster> = {}): Cluster {
       [0, 0.04],
     ],
     points: 12,
+    quality: 2,
+    robots: ["ada"],
+    first_seen: "2026-11-22T11:00:00Z",
+    last_seen: "2026-11-22T11:30:00Z",
+    ...fields,
+  };
+}
+
+/** The square from (5, 5) to (7, 7), of walls of which the one below is `w`. */
+export function chain(id: string, fields: Partial<Chain> = {}): Chain {
+  return {
+    id,
+    kind: "obstacle",
+    closed: true,
+    vertices_m: [
+      [5, 5],
+      [5, 7],
+      [7, 7],
+      [7, 5],
+    ],
+    covariances: Array.from({ length: 4 }, () => [
+      [0.0001, 0],
+      [0, 0.0004],
+    ]),
+    segments: ["x", "y", "z", "w"],
     quality: 2,
     robots: ["ada"],
     first_seen: "2026-11-22T11:00:00Z",
@@ -135,7 +161,7 @@ export function level(fields: Partial<LevelDescription> = {}): LevelDescription 
     revision: 7,
     folded_revision: 7,
     bounds: null,
-    counts: { contributions: 7, segments: 1, clusters: 1, tiles: 2 },
+    counts: { contributions: 7, segments: 1, clusters: 1, chains: 1, tiles: 2 },
     published: null,
     ...fields,
   };

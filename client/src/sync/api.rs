@@ -259,7 +259,7 @@ impl Api {
         self.get(&format!("{path}?since={since}&limit={limit}")).await
     }
 
-    /// Segments and clusters that changed after revision `since`.
+    /// Segments, clusters and chains that changed after revision `since`.
     ///
     /// # Errors
     /// See [`ApiError`].

@@ -4,7 +4,7 @@
 //! server's map bit for bit. A server that was set back to an older backup, or a level that was
 //! made anew, is noticed by its revision, its frame or its counts; the mirror then begins again
 //! from nothing and says so. (What is not noticed: a server that was set back and has since reached
-//! the same revision with as many segments, clusters and tiles.)
+//! the same revision with as many segments, clusters, chains and tiles.)
 
 mod file;
 
@@ -57,8 +57,8 @@ pub enum ResyncReason {
     OtherFrame,
     /// The server's log ends before the mirror's revision: it was set back to an older backup.
     ServerWentBack,
-    /// At the same revision the server counts other numbers of segments, clusters or tiles: it was
-    /// set back and has gone another way since.
+    /// At the same revision the server counts other numbers of segments, clusters, chains or tiles: it
+    /// was set back and has gone another way since.
     Diverged,
     /// The file on disk was damaged; it lies beside the new one as `level.mirror.damaged`.
     DamagedFile,
@@ -71,7 +71,7 @@ pub struct Refreshed {
     pub from_revision: i64,
     /// The revision now.
     pub to_revision: i64,
-    /// Segments, clusters and tiles in the patches: new, changed or removed.
+    /// Segments, clusters, chains and tiles in the patches: new, changed or removed.
     pub changes: usize,
     /// Why everything was read anew, if it was.
     pub resync: Option<ResyncReason>,
@@ -178,8 +178,8 @@ impl KnownMap {
     /// Whether the level, as it was described, counts other things at the same revision.
     fn contradicts(&self, level: &v1::LevelDescription) -> bool {
         let (map, counts) = (&self.map, &level.counts);
-        let here = [map.segments.len(), map.clusters.len(), map.tiles.len()];
-        let there = [counts.segments, counts.clusters, counts.tiles];
+        let here = [map.segments.len(), map.clusters.len(), map.chains.len(), map.tiles.len()];
+        let there = [counts.segments, counts.clusters, counts.chains, counts.tiles];
         self.revision == level.folded_revision && here.map(|count| count as i64) != there
     }
 }
@@ -432,9 +432,11 @@ async fn take_page(
     known.revision = revision;
     *changes += patch.segments.len()
         + patch.clusters.len()
+        + patch.chains.len()
         + patch.tiles.len()
         + patch.removed_segments.len()
         + patch.removed_clusters.len()
+        + patch.removed_chains.len()
         + patch.removed_tiles.len();
     Ok(more)
 }

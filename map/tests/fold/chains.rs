@@ -216,7 +216,7 @@ fn strewn(seed: u64, count: u64) -> Vec<Contribution> {
     let mut chance = Chance(seed);
     (0..count)
         .map(|number| {
-            let walls: Vec<_> = (0..1 + chance.bits() % 4)
+            let walls: Vec<_> = (0..=chance.bits() % 4)
                 .map(|_| {
                     // Ends on a lattice, a little off: corners are common.
                     let mut end = || {
@@ -232,7 +232,7 @@ fn strewn(seed: u64, count: u64) -> Vec<Contribution> {
                 .filter(|(a, b)| (a - b).norm() > 0.5)
                 .collect();
             let from = Point::new(chance.uniform(4.0, 11.0), chance.uniform(4.0, 11.0));
-            if chance.bits() % 4 == 0 {
+            if chance.bits().is_multiple_of(4) {
                 let (x, y) = (chance.uniform(4.0, 10.0), chance.uniform(4.0, 10.0));
                 let free = area(number, [x, x + 1.0], [y, y + 1.0], -120, SensorClass::Scanner);
                 return Contribution { id: id(seed, number), ..free };
@@ -243,7 +243,7 @@ fn strewn(seed: u64, count: u64) -> Vec<Contribution> {
 }
 
 fn cross(a: (Point, Point), b: (Point, Point)) -> bool {
-    let side = |p: (Point, Point), q: Point| (p.1 - p.0).perp(&(q - p.0)).signum();
+    let side = |p: (Point, Point), q: Point| (p.1 - p.0).perp(&(q - p.0)) > 0.0;
     side(a, b.0) != side(a, b.1) && side(b, a.0) != side(b, a.1)
 }
 

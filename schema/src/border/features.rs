@@ -9,6 +9,7 @@ use mapfold_map::raster::{TILE_CELLS, TILE_SIDE, Tile, TileIndex, TileKey};
 use mapfold_map::vector::{Cluster, Segment, SolidInterval};
 use uuid::Uuid;
 
+use super::chains::{chain_id, read_chain, read_chain_id, wire_chain};
 use super::number::{covariance, finite, read_instant};
 use super::violations::{Place, Violation, Violations};
 use crate::instant::to_rfc3339;
@@ -123,10 +124,12 @@ pub fn wire_patch(patch: &level::Patch, since: i64, revision: i64, more: bool) -
         more,
         segments: patch.segments.iter().map(|(id, s)| wire_segment(id, s)).collect(),
         clusters: patch.clusters.iter().map(|(id, c)| wire_cluster(id, c)).collect(),
+        chains: patch.chains.iter().map(|(id, c)| wire_chain(id, c)).collect(),
         tiles: patch.tiles.iter().map(|(key, t)| wire_tile(key, t)).collect(),
         removed: v1::Removed {
             segments: patch.removed_segments.iter().map(feature_id).collect(),
             clusters: patch.removed_clusters.iter().map(feature_id).collect(),
+            chains: patch.removed_chains.iter().map(chain_id).collect(),
             tiles: patch.removed_tiles.iter().map(wire_tile_address).collect(),
         },
     }
@@ -153,9 +156,26 @@ pub fn map_patch(patch: &v1::Patch) -> Result<level::Patch, Vec<Violation>> {
     let read = level::Patch {
         segments: read_all(&patch.segments, &root.field("segments"), &mut wrong, read_segment),
         clusters: read_all(&patch.clusters, &root.field("clusters"), &mut wrong, read_cluster),
+        chains: read_all(&patch.chains, &root.field("chains"), &mut wrong, read_chain),
         tiles: read_all(&patch.tiles, &root.field("tiles"), &mut wrong, read_tile),
-        removed_segments: read_ids(&patch.removed.segments, &removed.field("segments"), &mut wrong),
-        removed_clusters: read_ids(&patch.removed.clusters, &removed.field("clusters"), &mut wrong),
+        removed_segments: read_ids(
+            &patch.removed.segments,
+            &removed.field("segments"),
+            &mut wrong,
+            read_id,
+        ),
+        removed_clusters: read_ids(
+            &patch.removed.clusters,
+            &removed.field("clusters"),
+            &mut wrong,
+            read_id,
+        ),
+        removed_chains: read_ids(
+            &patch.removed.chains,
+            &removed.field("chains"),
+            &mut wrong,
+            read_chain_id,
+        ),
         removed_tiles: patch.removed.tiles.iter().map(map_tile_address).collect(),
     };
     wrong.none_or(Some(read))
@@ -179,11 +199,16 @@ fn read_all<W, K: Ord, V>(
     by_key
 }
 
-fn read_ids(texts: &[String], place: &Place<'_>, wrong: &mut Violations) -> Vec<FeatureId> {
-    texts.iter().enumerate().filter_map(|(i, text)| read_id(text, &place.index(i), wrong)).collect()
+fn read_ids<K>(
+    texts: &[String],
+    place: &Place<'_>,
+    wrong: &mut Violations,
+    read: impl Fn(&str, &Place<'_>, &mut Violations) -> Option<K>,
+) -> Vec<K> {
+    texts.iter().enumerate().filter_map(|(i, text)| read(text, &place.index(i), wrong)).collect()
 }
 
-fn alone<T>(read: impl FnOnce(&mut Violations) -> Option<T>) -> Result<T, Violation> {
+pub(super) fn alone<T>(read: impl FnOnce(&mut Violations) -> Option<T>) -> Result<T, Violation> {
     let mut wrong = Violations::default();
     let value = read(&mut wrong);
     wrong.none_or(value).map_err(|found| {
@@ -322,7 +347,11 @@ fn read_cluster(
 }
 
 /// A point in metres, as two finite numbers.
-fn read_point([x, y]: [f64; 2], place: &Place<'_>, wrong: &mut Violations) -> Option<Point> {
+pub(super) fn read_point(
+    [x, y]: [f64; 2],
+    place: &Place<'_>,
+    wrong: &mut Violations,
+) -> Option<Point> {
     let x = finite(x, &place.index(0), wrong);
     let y = finite(y, &place.index(1), wrong);
     Some(Point::new(x?, y?))
@@ -372,7 +401,7 @@ fn read_tile(
     Some((key, Tile::new(cells)))
 }
 
-fn read_id(text: &str, place: &Place<'_>, wrong: &mut Violations) -> Option<FeatureId> {
+pub(super) fn read_id(text: &str, place: &Place<'_>, wrong: &mut Violations) -> Option<FeatureId> {
     let id = parse_feature_id(text);
     if id.is_none() {
         wrong.add(place, "bad_feature_id", "this must be <contribution uuid>-<index>");
@@ -381,13 +410,13 @@ fn read_id(text: &str, place: &Place<'_>, wrong: &mut Violations) -> Option<Feat
 }
 
 /// Who saw a feature, and when.
-struct Seen {
-    robots: Vec<RobotName>,
-    first_us: i64,
-    last_us: i64,
+pub(super) struct Seen {
+    pub(super) robots: Vec<RobotName>,
+    pub(super) first_us: i64,
+    pub(super) last_us: i64,
 }
 
-fn read_seen(
+pub(super) fn read_seen(
     robots: &[String],
     first: &str,
     last: &str,

@@ -27,5 +27,6 @@ macro_rules! same_words {
 
 same_words!(v1::Facing, vector::Facing, Origin, Away);
 same_words!(v1::EndKind, vector::EndKind, Corner, Jump, Occluded);
+same_words!(v1::ChainKind, vector::ChainKind, Polyline, Obstacle, Room);
 same_words!(v1::SensorClass, raster::SensorClass, Scanner, Sonar);
 same_words!(v1::Provenance, level::Provenance, Datum, SharedMap, Odometry);

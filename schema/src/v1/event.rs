@@ -11,7 +11,7 @@ pub struct LevelEvent {
     pub revision: i64,
     /// Robots whose contributions are new in it.
     pub robots: Vec<String>,
-    /// Number of changed or removed segments and clusters.
+    /// Number of changed or removed segments, clusters and chains.
     pub features: u32,
     /// Number of changed or removed tiles.
     pub tiles: u32,

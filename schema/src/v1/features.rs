@@ -76,6 +76,44 @@ pub struct Segment {
     pub last_seen: String,
 }
 
+/// What a chain encloses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ChainKind {
+    /// Nothing: it is open.
+    Polyline,
+    /// Closed, with free space outside: a thing that stands in a room.
+    Obstacle,
+    /// Closed, with free space inside.
+    Room,
+}
+
+/// Walls that meet at their ends, in the level frame, with free space on the left of whoever walks
+/// along them. Never meets itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Chain {
+    /// `<segment id>.<piece>` of the piece of wall that it is called after.
+    pub id: String,
+    /// What it encloses.
+    pub kind: ChainKind,
+    /// Whether the last vertex is joined to the first: not for a polyline.
+    pub closed: bool,
+    /// The vertices in order, [x, y]; of a closed chain at least 3, and the first is not repeated.
+    pub vertices_m: Vec<[f64; 2]>,
+    /// Covariance of each vertex, safe for any correlation of what its walls may share.
+    pub covariances: Vec<[[f64; 2]; 2]>,
+    /// The segments that its edges lie on, edge by edge.
+    pub segments: Vec<String>,
+    /// The least quality of its segments: each part of it was seen in so many distinct looks.
+    pub quality: u32,
+    /// Who saw any of it.
+    pub robots: Vec<String>,
+    /// Earliest look.
+    pub first_seen: String,
+    /// Latest look.
+    pub last_seen: String,
+}
+
 /// A thing of the map that no line explains.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Cluster {

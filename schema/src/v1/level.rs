@@ -77,6 +77,9 @@ pub struct Counts {
     pub segments: i64,
     /// Published clusters.
     pub clusters: i64,
+    /// Published chains.
+    #[serde(default)]
+    pub chains: i64,
     /// Published tiles of all layers.
     pub tiles: i64,
 }

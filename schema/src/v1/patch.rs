@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::{Cluster, Segment, SensorClass};
+use super::{Chain, Cluster, Segment, SensorClass};
 
-/// `GET L/vector`: segments and clusters that changed after `since`.
+/// `GET L/vector`: segments, clusters and chains that changed after `since`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct VectorPatch {
     /// The revision that was asked for.
@@ -16,6 +16,9 @@ pub struct VectorPatch {
     pub segments: Vec<Segment>,
     /// New or changed clusters.
     pub clusters: Vec<Cluster>,
+    /// New or changed chains.
+    #[serde(default)]
+    pub chains: Vec<Chain>,
     /// What is no more.
     pub removed: Removed,
 }
@@ -29,6 +32,9 @@ pub struct Removed {
     /// Clusters.
     #[serde(default)]
     pub clusters: Vec<String>,
+    /// Chains.
+    #[serde(default)]
+    pub chains: Vec<String>,
     /// Tiles.
     #[serde(default)]
     pub tiles: Vec<TileAddress>,
@@ -87,6 +93,9 @@ pub struct Patch {
     pub segments: Vec<Segment>,
     /// New or changed clusters.
     pub clusters: Vec<Cluster>,
+    /// New or changed chains.
+    #[serde(default)]
+    pub chains: Vec<Chain>,
     /// New or changed tiles, whole.
     pub tiles: Vec<TileEvidence>,
     /// What is no more.

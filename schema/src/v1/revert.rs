@@ -120,12 +120,15 @@ pub struct RevertPreview {
     pub segments: ChangeCounts,
     /// Clusters.
     pub clusters: ChangeCounts,
+    /// Chains.
+    #[serde(default)]
+    pub chains: ChangeCounts,
     /// Tiles of all layers.
     pub tiles: ChangeCounts,
     /// What covers all that would change, before and after; absent if nothing would.
     #[serde(default)]
     pub bounds: Option<Bounds>,
-    /// The segments and clusters that would change, at most 200.
+    /// The segments, clusters and chains that would change, at most 200.
     pub features: Vec<ChangedFeature>,
     /// Whether there are more of them.
     pub more_features: bool,
@@ -142,7 +145,7 @@ pub struct ChangeCounts {
     pub removed: u32,
 }
 
-/// A segment or a cluster that would change.
+/// A segment, cluster or chain that would change.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct ChangedFeature {
     /// Its identity.
@@ -161,6 +164,8 @@ pub enum FeatureKind {
     Segment,
     /// A cluster.
     Cluster,
+    /// A chain.
+    Chain,
 }
 
 /// What becomes of a thing.

@@ -137,7 +137,7 @@ pub(super) struct ExportCommand {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(super) enum ExportFormat {
-    /// Segments and clusters in metres
+    /// Segments, clusters and chains in metres
     Geojson,
     /// A YAML and a PGM, as `map_server` reads them
     Nav2,

@@ -55,7 +55,7 @@ fn tell(report: &Report) -> Result<(), CommandError> {
     let verdict = if report.is_sound() { "sound" } else { "NOT SOUND" };
     say(&format!(
         "{}/{}: {verdict}; revision {}, folded up to {}; {} contributions, {}{} segments, {} clusters, \
-         {} tiles; map {}",
+         {} chains, {} tiles; map {}",
         report.site,
         report.level,
         report.revision,
@@ -68,6 +68,7 @@ fn tell(report: &Report) -> Result<(), CommandError> {
         },
         report.segments,
         report.clusters,
+        report.chains,
         report.tiles,
         report.map_digest,
     ))?;

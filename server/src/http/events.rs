@@ -166,8 +166,10 @@ impl Feed {
                     robots: Vec::new(),
                     features: (patch.segments.len()
                         + patch.clusters.len()
+                        + patch.chains.len()
                         + patch.removed_segments.len()
-                        + patch.removed_clusters.len()) as u32,
+                        + patch.removed_clusters.len()
+                        + patch.removed_chains.len()) as u32,
                     tiles: (patch.tiles.len() + patch.removed_tiles.len()) as u32,
                     acts: 0,
                 }),

@@ -26,7 +26,8 @@ type Writer = fn(&Snapshot) -> Result<Vec<u8>, ApiError>;
 /// The whole map as a file: `geojson`, or `nav2` (a zip of `map.yaml` and `map.pgm`).
 ///
 /// Equal maps give equal bytes. GeoJSON has a `LineString` for each solid part of a segment (with
-/// the feature id `<segment id>#<n>`) and a `Polygon` for each cluster, in metres of the level.
+/// the feature id `<segment id>#<n>`), a `Polygon` for each cluster and the one or the other for each
+/// chain, in metres of the level.
 #[utoipa::path(
     get, path = route::EXPORTS, operation_id = "export", tag = "map",
     params(

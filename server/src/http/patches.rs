@@ -22,7 +22,7 @@ pub(super) struct PatchQuery {
     /// Only what changed after this revision; 0 gives all.
     #[serde(default)]
     since: i64,
-    /// About how many things (segments, clusters, tiles, removals) at once, at most 20000; 2000 if
+    /// About how many things (segments, clusters, chains, tiles, removals) at once, at most 20000; 2000 if
     /// absent. A revision is never cut in two.
     limit: Option<usize>,
 }

@@ -1,4 +1,4 @@
-//! `L/vector`: segments and clusters.
+//! `L/vector`: segments, clusters and chains.
 
 use axum::response::Response;
 use mapfold_schema::codec;
@@ -11,7 +11,7 @@ use super::answer::{DATA_OR_GEOJSON, Reader};
 use super::problem::ApiError;
 use super::query::{QueryOf, SinceInBox};
 
-/// Segments and clusters that changed after `since`, and the ids of those that are no more.
+/// Segments, clusters and chains that changed after `since`, and the ids of those that are no more.
 ///
 /// `since=0` gives all. With a `bbox`: what touches it; what changed and lies outside of it is then
 /// among the removed, because it may have lain inside. As GeoJSON, the coordinates are metres of

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use mapfold_map::level::{Changes, ContributionId, FeatureId, LevelMap};
 use mapfold_map::raster::{SensorClass, Tile, TileIndex, TileKey};
-use mapfold_map::vector::{Cluster, Segment};
+use mapfold_map::vector::{Chain, ChainId, Cluster, Segment};
 use rpds::{RedBlackTreeMapSync, RedBlackTreeSetSync};
 
 /// A key that no other comes before.
@@ -20,6 +20,10 @@ pub(super) trait Least: Ord + Copy {
 
 impl Least for FeatureId {
     const LEAST: Self = Self { contribution: ContributionId([0; 16]), index: 0 };
+}
+
+impl Least for ChainId {
+    const LEAST: Self = Self { segment: FeatureId::LEAST, piece: i16::MIN };
 }
 
 impl Least for TileKey {
@@ -125,7 +129,7 @@ impl<K: Least, V: PartialEq> History<K, V> {
 /// How much a step changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct ChangeCounts {
-    /// Changed or removed segments and clusters.
+    /// Changed or removed segments, clusters and chains.
     pub(crate) features: u32,
     /// Changed or removed tiles.
     pub(crate) tiles: u32,
@@ -145,6 +149,8 @@ pub(crate) struct MapHistory {
     pub(super) segments: History<FeatureId, Segment>,
     /// Clusters.
     pub(super) clusters: History<FeatureId, Cluster>,
+    /// Chains.
+    pub(super) chains: History<ChainId, Chain>,
     /// Tiles.
     pub(super) tiles: History<TileKey, Tile>,
 }
@@ -171,7 +177,8 @@ impl MapHistory {
         }
         ChangeCounts {
             features: all(&mut self.segments, &changes.segments, &map.segments, revision)
-                + all(&mut self.clusters, &changes.clusters, &map.clusters, revision),
+                + all(&mut self.clusters, &changes.clusters, &map.clusters, revision)
+                + all(&mut self.chains, &changes.chains, &map.chains, revision),
             tiles: all(&mut self.tiles, &changes.tiles, &map.tiles, revision),
         }
     }
@@ -187,6 +194,7 @@ impl MapHistory {
         }
         all(&self.segments, &changes.segments, &map.segments)
             && all(&self.clusters, &changes.clusters, &map.clusters)
+            && all(&self.chains, &changes.chains, &map.chains)
             && all(&self.tiles, &changes.tiles, &map.tiles)
     }
 
@@ -207,6 +215,7 @@ impl MapHistory {
         let mut changed = Vec::new();
         revisions(&self.segments, since, limit, &mut changed);
         revisions(&self.clusters, since, limit, &mut changed);
+        revisions(&self.chains, since, limit, &mut changed);
         revisions(&self.tiles, since, limit, &mut changed);
         if changed.len() <= limit {
             return None;

@@ -2,11 +2,11 @@
 //! revision of those tiles, then the rest of the log.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Debug;
 use std::sync::Arc;
 
-use mapfold_map::level::FeatureId;
 use mapfold_map::raster::{Tile, TileKey};
-use mapfold_schema::border::{Target, parse_feature_id};
+use mapfold_schema::border::{Target, parse_chain_id, parse_feature_id};
 
 use super::folding::Folding;
 use super::history::{History, Least, MapHistory};
@@ -132,22 +132,25 @@ fn restored_with_history(
     for row in &stored.rows.tiles {
         history.tiles.put(row.key, row.revision, map.tiles.get(&row.key).cloned());
     }
-    adopt(&stored.rows.segments, &map.segments, rows::segment, &mut history.segments)?;
-    adopt(&stored.rows.clusters, &map.clusters, rows::cluster, &mut history.clusters)?;
+    let rows = &stored.rows;
+    let MapHistory { segments, clusters, chains, .. } = &mut history;
+    adopt(&rows.segments, &map.segments, parse_feature_id, rows::segment, segments)?;
+    adopt(&rows.clusters, &map.clusters, parse_feature_id, rows::cluster, clusters)?;
+    adopt(&rows.chains, &map.chains, parse_chain_id, rows::chain, chains)?;
     *folding.history_mut() = history;
     Ok(folding)
 }
 
 /// Takes the dates of stored features over, if the features are the very ones of the fold.
-fn adopt<V: PartialEq>(
+fn adopt<K: Least + Debug, V: PartialEq>(
     stored: &[FeatureRow],
-    folded: &BTreeMap<FeatureId, Arc<V>>,
-    content: fn(&FeatureId, &V) -> Result<Vec<u8>, String>,
-    history: &mut History<FeatureId, V>,
+    folded: &BTreeMap<K, Arc<V>>,
+    parse: fn(&str) -> Option<K>,
+    content: fn(&K, &V) -> Result<Vec<u8>, String>,
+    history: &mut History<K, V>,
 ) -> Result<(), String> {
     for row in stored {
-        let id = parse_feature_id(&row.feature)
-            .ok_or_else(|| format!("{:?} is no feature", row.feature))?;
+        let id = parse(&row.feature).ok_or_else(|| format!("{:?} is no feature", row.feature))?;
         let value = folded.get(&id);
         if value.map(|v| content(&id, v)).transpose()? != row.content {
             return Err(format!("feature {} is another", row.feature));
@@ -177,13 +180,16 @@ async fn mend(
             rows.iter().map(|r| (r.feature.clone(), r.content.clone())).collect()
         };
         let history = folding.history_mut();
-        redate(&stored.rows.segments, &known(&true_rows.segments), revision, &mut history.segments);
-        redate(&stored.rows.clusters, &known(&true_rows.clusters), revision, &mut history.clusters);
+        let MapHistory { segments, clusters, chains, tiles } = history;
+        let rows = &stored.rows;
+        redate(&rows.segments, &known(&true_rows.segments), parse_feature_id, revision, segments);
+        redate(&rows.clusters, &known(&true_rows.clusters), parse_feature_id, revision, clusters);
+        redate(&rows.chains, &known(&true_rows.chains), parse_chain_id, revision, chains);
         let true_tiles: BTreeMap<TileKey, Option<Vec<u8>>> =
             true_rows.tiles.iter().map(|r| (r.key, r.content.clone())).collect();
-        for row in &stored.rows.tiles {
+        for row in &rows.tiles {
             if true_tiles.get(&row.key) != Some(&row.content) {
-                redate_one(row.key, revision, &mut history.tiles);
+                redate_one(row.key, revision, tiles);
             }
         }
         let everything = rows::changed(folding.history(), -1, revision)?;
@@ -206,15 +212,16 @@ async fn write_mended(
     Ok(())
 }
 
-fn redate<V: PartialEq>(
+fn redate<K: Least, V: PartialEq>(
     stored: &[FeatureRow],
     true_rows: &BTreeMap<String, Option<Vec<u8>>>,
+    parse: fn(&str) -> Option<K>,
     revision: i64,
-    history: &mut History<FeatureId, V>,
+    history: &mut History<K, V>,
 ) {
     for row in stored {
         if true_rows.get(&row.feature) != Some(&row.content)
-            && let Some(id) = parse_feature_id(&row.feature)
+            && let Some(id) = parse(&row.feature)
         {
             redate_one(id, revision, history);
         }

@@ -108,8 +108,16 @@ impl LevelHandle {
             }
             outcome.await.ok().flatten().ok_or(RevertError::Overtaken)?
         };
-        let Outcome { revision, segments, clusters, tiles, bounds, features, more_features } =
-            outcome;
+        let Outcome {
+            revision,
+            segments,
+            clusters,
+            chains,
+            tiles,
+            bounds,
+            features,
+            more_features,
+        } = outcome;
         Ok(v1::RevertPreview {
             revision,
             contributions: covered,
@@ -117,6 +125,7 @@ impl LevelHandle {
             robots: shares,
             segments,
             clusters,
+            chains,
             tiles,
             bounds,
             features,

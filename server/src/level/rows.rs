@@ -1,11 +1,11 @@
 //! From a level's history to the rows of the store.
 
 use mapfold_map::level::FeatureId;
-use mapfold_map::vector::{Cluster, Segment};
-use mapfold_schema::border::{feature_id, wire_cluster, wire_segment};
+use mapfold_map::vector::{Chain, ChainId, Cluster, Segment};
+use mapfold_schema::border::{chain_id, feature_id, wire_chain, wire_cluster, wire_segment};
 use mapfold_schema::codec;
 
-use super::history::{History, MapHistory};
+use super::history::{History, Least, MapHistory};
 use crate::store::map_rows::{FeatureRow, MapRows, TileRow};
 use crate::store::{StoreError, tile_cells};
 
@@ -21,10 +21,12 @@ pub(crate) fn changed(history: &MapHistory, since: i64, until: i64) -> Result<Ma
     }
     tiles.sort_unstable_by_key(|row| row.key);
     Ok(MapRows {
-        segments: features(&history.segments, since, until, segment)
+        segments: features(&history.segments, since, until, feature_id, segment)
             .map_err(|e| unfit("segments", e))?,
-        clusters: features(&history.clusters, since, until, cluster)
+        clusters: features(&history.clusters, since, until, feature_id, cluster)
             .map_err(|e| unfit("clusters", e))?,
+        chains: features(&history.chains, since, until, chain_id, chain)
+            .map_err(|e| unfit("chains", e))?,
         tiles,
     })
 }
@@ -39,16 +41,22 @@ pub(super) fn cluster(id: &FeatureId, cluster: &Cluster) -> Result<Vec<u8>, Stri
     codec::to_cbor(&wire_cluster(id, cluster)).map_err(|e| e.to_string())
 }
 
-fn features<V: PartialEq>(
-    history: &History<FeatureId, V>,
+/// The column of a chain.
+pub(super) fn chain(id: &ChainId, chain: &Chain) -> Result<Vec<u8>, String> {
+    codec::to_cbor(&wire_chain(id, chain)).map_err(|e| e.to_string())
+}
+
+fn features<K: Least, V: PartialEq>(
+    history: &History<K, V>,
     since: i64,
     until: i64,
-    content: fn(&FeatureId, &V) -> Result<Vec<u8>, String>,
+    text: fn(&K) -> String,
+    content: fn(&K, &V) -> Result<Vec<u8>, String>,
 ) -> Result<Vec<FeatureRow>, String> {
     let mut rows = Vec::new();
     for (revision, id, value) in history.changed(since, until) {
         let content = value.map(|value| content(&id, value)).transpose()?;
-        rows.push(FeatureRow { feature: feature_id(&id), revision, content });
+        rows.push(FeatureRow { feature: text(&id), revision, content });
     }
     rows.sort_unstable_by(|a, b| a.feature.cmp(&b.feature));
     Ok(rows)

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use mapfold_map::level::Patch;
 use mapfold_schema::border::{
-    feature_id, wire_cluster, wire_patch, wire_segment, wire_tile_address,
+    chain_id, feature_id, wire_chain, wire_cluster, wire_patch, wire_segment, wire_tile_address,
 };
 use mapfold_schema::v1;
 
 use super::history::{History, Least};
-use super::snapshot::{Snapshot, hull_bounds, segment_bounds, tile_bounds};
+use super::snapshot::{Snapshot, chain_bounds, hull_bounds, segment_bounds, tile_bounds};
 
 /// A revision was named that this map has not reached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -35,7 +35,7 @@ impl Snapshot {
         Ok(self.patch(since, self.folded_revision()))
     }
 
-    /// Segments and clusters that changed after `since`. With a `bbox`, what touches it (by its own
+    /// Segments, clusters and chains that changed after `since`. With a `bbox`, what touches it (by its own
     /// bounding box); what changed and lies outside is then among the removed, because it may have
     /// lain inside.
     ///
@@ -52,6 +52,7 @@ impl Snapshot {
             revision: self.folded_revision(),
             segments: Vec::new(),
             clusters: Vec::new(),
+            chains: Vec::new(),
             removed: v1::Removed::default(),
         };
         for (_, id, segment) in self.history().segments.changed(since, i64::MAX) {
@@ -65,6 +66,13 @@ impl Snapshot {
             match cluster.filter(|c| touches(hull_bounds(&c.hull), bbox)) {
                 Some(cluster) => answer.clusters.push(wire_cluster(&id, cluster)),
                 None if since > 0 => answer.removed.clusters.push(feature_id(&id)),
+                None => {}
+            }
+        }
+        for (_, id, chain) in self.history().chains.changed(since, i64::MAX) {
+            match chain.filter(|c| touches(chain_bounds(c), bbox)) {
+                Some(chain) => answer.chains.push(wire_chain(&id, chain)),
+                None if since > 0 => answer.removed.chains.push(chain_id(&id)),
                 None => {}
             }
         }
@@ -133,12 +141,15 @@ impl Snapshot {
         let history = self.history();
         let (segments, removed_segments) = changed(&history.segments, since, until);
         let (clusters, removed_clusters) = changed(&history.clusters, since, until);
+        let (chains, removed_chains) = changed(&history.chains, since, until);
         let (tiles, removed_tiles) = changed(&history.tiles, since, until);
         patch.segments.extend(segments);
         patch.clusters.extend(clusters);
+        patch.chains.extend(chains);
         patch.tiles.extend(tiles);
         patch.removed_segments = removed_segments;
         patch.removed_clusters = removed_clusters;
+        patch.removed_chains = removed_chains;
         patch.removed_tiles = removed_tiles;
         patch
     }

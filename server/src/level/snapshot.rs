@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use mapfold_map::geometry::Point;
 use mapfold_map::level::{FeatureId, LevelMap};
 use mapfold_map::raster::{TILE_SIDE, Tile, TileIndex, TileKey};
-use mapfold_map::vector::{Cluster, Segment};
+use mapfold_map::vector::{Chain, ChainId, Cluster, Segment};
 use mapfold_schema::v1;
 
 use super::folding::Folding;
@@ -73,6 +73,7 @@ impl Snapshot {
             in_force: self.in_force,
             segments: self.history.segments.live_count() as i64,
             clusters: self.history.clusters.live_count() as i64,
+            chains: self.history.chains.live_count() as i64,
             tiles: self.history.tiles.live_count() as i64,
         }
     }
@@ -93,6 +94,7 @@ impl Snapshot {
             Arc::new(LevelMap {
                 segments: self.segments().map(|(id, s)| (*id, Arc::clone(s))).collect(),
                 clusters: self.clusters().map(|(id, c)| (*id, Arc::clone(c))).collect(),
+                chains: self.chains().map(|(id, c)| (*id, Arc::clone(c))).collect(),
                 tiles: self.tiles().map(|(key, t)| (*key, Arc::clone(t))).collect(),
             })
         }))
@@ -106,6 +108,11 @@ impl Snapshot {
     /// The clusters, by identity.
     pub fn clusters(&self) -> impl Iterator<Item = (&FeatureId, &Arc<Cluster>)> {
         self.history.clusters.live()
+    }
+
+    /// The chains, by identity.
+    pub fn chains(&self) -> impl Iterator<Item = (&ChainId, &Arc<Chain>)> {
+        self.history.chains.live()
     }
 
     /// The tiles, by layer and place.
@@ -150,6 +157,11 @@ pub(super) fn tile_bounds(tile: TileIndex, resolution_m: f64) -> v1::Bounds {
 pub(super) fn segment_bounds(segment: &Segment) -> Option<v1::Bounds> {
     let ends = segment.solid.iter().flat_map(|part| [part.span.from_m(), part.span.to_m()]);
     points_bounds(ends.map(|along| segment.line.at(along)))
+}
+
+/// What a chain's edges cover.
+pub(super) fn chain_bounds(chain: &Chain) -> Option<v1::Bounds> {
+    points_bounds(chain.vertices.iter().map(|vertex| vertex.at))
 }
 
 /// What a hull covers.

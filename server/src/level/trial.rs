@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use mapfold_map::level::{Batch, Changes};
-use mapfold_schema::border::feature_id;
+use mapfold_schema::border::{chain_id, feature_id};
 use mapfold_schema::v1::{Bounds, ChangeCounts, ChangeKind, ChangedFeature, FeatureKind};
 use tokio::sync::oneshot;
 
 use super::folding::Folding;
 use super::history::{History, Least};
-use super::snapshot::{hull_bounds, segment_bounds, tile_bounds, union};
+use super::snapshot::{chain_bounds, hull_bounds, segment_bounds, tile_bounds, union};
 use crate::store::acts::ActKind;
 
 /// Features that a preview names.
@@ -32,6 +32,7 @@ pub(super) struct Outcome {
     pub(super) revision: i64,
     pub(super) segments: ChangeCounts,
     pub(super) clusters: ChangeCounts,
+    pub(super) chains: ChangeCounts,
     pub(super) tiles: ChangeCounts,
     pub(super) bounds: Option<Bounds>,
     pub(super) features: Vec<ChangedFeature>,
@@ -51,7 +52,7 @@ impl Outcome {
             &map.segments,
             |_, segment| segment_bounds(segment),
             &mut bounds,
-            |id, change| features.push((FeatureKind::Segment, *id, change)),
+            |id, change| features.push((FeatureKind::Segment, feature_id(id), change)),
         );
         outcome.clusters = compare(
             &changes.clusters,
@@ -59,7 +60,15 @@ impl Outcome {
             &map.clusters,
             |_, cluster| hull_bounds(&cluster.hull),
             &mut bounds,
-            |id, change| features.push((FeatureKind::Cluster, *id, change)),
+            |id, change| features.push((FeatureKind::Cluster, feature_id(id), change)),
+        );
+        outcome.chains = compare(
+            &changes.chains,
+            &history.chains,
+            &map.chains,
+            |_, chain| chain_bounds(chain),
+            &mut bounds,
+            |id, change| features.push((FeatureKind::Chain, chain_id(id), change)),
         );
         let resolution_m = folding.level().config().resolution;
         outcome.tiles = compare(
@@ -75,7 +84,7 @@ impl Outcome {
         features.truncate(FEATURES_MAX);
         outcome.features = features
             .into_iter()
-            .map(|(kind, id, change)| ChangedFeature { id: feature_id(&id), kind, change })
+            .map(|(kind, id, change)| ChangedFeature { id, kind, change })
             .collect();
         outcome
     }

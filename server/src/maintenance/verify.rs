@@ -48,6 +48,8 @@ pub struct Report {
     pub segments: usize,
     /// Clusters of the refolded map.
     pub clusters: usize,
+    /// Chains of the refolded map.
+    pub chains: usize,
     /// Tiles of the refolded map.
     pub tiles: usize,
     /// SHA-256 of the refolded map in canonical form, lower-case hexadecimal: equal maps have
@@ -303,6 +305,7 @@ impl Check {
         };
         self.compare("segment", &features(&rows.segments), &features(&refolded.segments));
         self.compare("cluster", &features(&rows.clusters), &features(&refolded.clusters));
+        self.compare("chain", &features(&rows.chains), &features(&refolded.chains));
         self.compare("tile", &tiles(&rows), &tiles(&refolded));
     }
 
@@ -361,6 +364,7 @@ impl Check {
             acts: self.acts.count,
             segments: map.segments.len(),
             clusters: map.clusters.len(),
+            chains: map.chains.len(),
             tiles: map.tiles.len(),
             map_digest,
             faults: self.faults,
@@ -382,7 +386,8 @@ fn map_digest(folding: &Folding) -> Result<String, StoreError> {
             digest.update(part);
         }
     };
-    for (kind, rows) in [("segment", &rows.segments), ("cluster", &rows.clusters)] {
+    let kinds = [("segment", &rows.segments), ("cluster", &rows.clusters), ("chain", &rows.chains)];
+    for (kind, rows) in kinds {
         for row in rows {
             if let Some(content) = &row.content {
                 add(kind, &row.feature, content);

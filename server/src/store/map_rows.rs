@@ -11,7 +11,7 @@ use super::transaction::Tx;
 use super::values::{Bulk, bulk};
 use super::{Store, StoreError, retried};
 
-/// A segment's or a cluster's row.
+/// A segment's, a cluster's or a chain's row.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FeatureRow {
     /// Its identity as text.
@@ -40,6 +40,8 @@ pub struct MapRows {
     pub segments: Vec<FeatureRow>,
     /// Clusters.
     pub clusters: Vec<FeatureRow>,
+    /// Chains.
+    pub chains: Vec<FeatureRow>,
     /// Tiles.
     pub tiles: Vec<TileRow>,
 }
@@ -47,7 +49,7 @@ pub struct MapRows {
 impl MapRows {
     /// Number of rows.
     pub fn len(&self) -> usize {
-        self.segments.len() + self.clusters.len() + self.tiles.len()
+        self.segments.len() + self.clusters.len() + self.chains.len() + self.tiles.len()
     }
 
     /// Whether there are none.
@@ -84,6 +86,14 @@ static UPSERT_SEGMENTS: Bulk = bulk!(
 
 static UPSERT_CLUSTERS: Bulk = bulk!(
     "insert into clusters (site, level, feature, revision, content) values ",
+    5,
+    from 1,
+    " on conflict (site, level, feature) do update set revision = excluded.revision, \
+     content = excluded.content"
+);
+
+static UPSERT_CHAINS: Bulk = bulk!(
+    "insert into chains (site, level, feature, revision, content) values ",
     5,
     from 1,
     " on conflict (site, level, feature) do update set revision = excluded.revision, \
@@ -129,6 +139,7 @@ impl Store {
         let mut tx = self.begin_write().await?;
         upsert_features(&mut tx, site, level, &UPSERT_SEGMENTS, &rows.segments).await?;
         upsert_features(&mut tx, site, level, &UPSERT_CLUSTERS, &rows.clusters).await?;
+        upsert_features(&mut tx, site, level, &UPSERT_CHAINS, &rows.chains).await?;
         for (statement, piece) in UPSERT_TILES.statements(&rows.tiles) {
             let mut query = sqlx::query(statement);
             for row in piece {
@@ -198,6 +209,13 @@ impl Store {
         .bind(level)
         .fetch_all(&mut *tx)
         .await?;
+        let chains = sqlx::query(
+            "select feature, revision, content from chains where site = $1 and level = $2",
+        )
+        .bind(site)
+        .bind(level)
+        .fetch_all(&mut *tx)
+        .await?;
         let tiles = sqlx::query(
             "select sensor, x, y, revision, content from tiles where site = $1 and level = $2",
         )
@@ -214,6 +232,7 @@ impl Store {
             rows: MapRows {
                 segments: features(&segments, "segments")?,
                 clusters: features(&clusters, "clusters")?,
+                chains: features(&chains, "chains")?,
                 tiles: tiles.iter().map(tile_row).collect::<Result<_, _>>()?,
             },
         }))

@@ -111,7 +111,7 @@ async fn json_and_cbor_say_the_same_and_anything_else_is_not_acceptable() {
     let vector: VectorPatch = server.admin().get(&path).await.expect(200).data();
     let solid: usize = vector.segments.iter().map(|s| s.solid.len()).sum();
     let features = collection["features"].as_array().unwrap();
-    assert_eq!(features.len(), solid + vector.clusters.len());
+    assert_eq!(features.len(), solid + vector.clusters.len() + vector.chains.len());
     for accept in ["text/html", "application/xml", "application/json;q=0"] {
         let answer = server.admin().get_with(&path, ACCEPT, accept).await;
         assert_eq!(answer.code(406), "not_acceptable", "{accept}");
@@ -130,7 +130,7 @@ async fn since_answers_what_changed_and_nothing_once_there_is_nothing_new() {
         let now = server.admin().get(&format!("{path}?since=3")).await.expect(200);
         assert_eq!(now.header("mapfold-revision"), "3");
         let now: serde_json::Value = serde_json::from_slice(&now.body).unwrap();
-        for member in ["segments", "clusters", "tiles"] {
+        for member in ["segments", "clusters", "chains", "tiles"] {
             assert!(now[member].as_array().is_none_or(Vec::is_empty), "{path}: {now}");
         }
         let ahead = server.admin().get(&format!("{path}?since=4")).await.problem(410);
@@ -140,7 +140,9 @@ async fn since_answers_what_changed_and_nothing_once_there_is_nothing_new() {
     }
     let nowhere = format!("{vector}?bbox=500,500,501,501");
     let nowhere: VectorPatch = server.admin().get(&nowhere).await.expect(200).data();
-    assert!(nowhere.segments.is_empty() && nowhere.clusters.is_empty());
+    assert!(
+        nowhere.segments.is_empty() && nowhere.clusters.is_empty() && nowhere.chains.is_empty()
+    );
     for bad in ["bbox=1,2,3", "bbox=3,0,1,1", "bbox=nan,0,1,1", "since=x", "at=3"] {
         let answer = server.admin().get(&format!("{vector}?{bad}")).await;
         assert_eq!(answer.code(400), "query_invalid", "{bad}");

@@ -48,8 +48,8 @@ async fn a_sound_level_is_found_sound(database: Database) {
     assert_eq!((report.revision, report.folded_revision, report.contributions), (70, 50, 70));
     let map = folded(&looks(41, 70)).map().clone();
     assert_eq!(
-        (report.segments, report.clusters, report.tiles),
-        (map.segments.len(), map.clusters.len(), map.tiles.len())
+        (report.segments, report.clusters, report.chains, report.tiles),
+        (map.segments.len(), map.clusters.len(), map.chains.len(), map.tiles.len())
     );
 }
 

@@ -15,6 +15,7 @@ on_each_engine!(
     a_killed_level_comes_back_bit_for_bit_from_rows_and_the_rest_of_its_log,
     readers_of_every_revision_before_the_kill_come_up_to_date_after_it,
     a_stored_map_that_is_not_its_logs_is_folded_again_and_put_right,
+    a_map_from_before_chains_were_kept_has_them_once_it_is_opened,
 );
 
 const LOOKS: usize = 200;
@@ -142,4 +143,27 @@ async fn a_stored_map_that_is_not_its_logs_is_folded_again_and_put_right(databas
     assert_eq!(&*more.map(), folded(&looks(23, 80)).map());
     drop(level);
     tokio::time::timeout(Duration::from_mins(1), levels.shutdown()).await.unwrap();
+}
+
+async fn a_map_from_before_chains_were_kept_has_them_once_it_is_opened(database: Database) {
+    let store = database.store().await;
+    furnish(&store).await;
+    let (levels, level) = open(&store, still()).await;
+    let before = submit_all(&level, &looks(24, 80)).await;
+    assert!(before.chains().count() > 0);
+    drop(level);
+    levels.shutdown().await;
+    let sound = store.stored_map(SITE, LEVEL).await.unwrap().unwrap();
+    // As it is after the migration: the table is there and empty.
+    assert_eq!(database.meddle("delete from chains").await, sound.rows.chains.len() as u64);
+    let (levels, level) = open(&store, still()).await;
+    let snapshot = level.snapshot();
+    assert_eq!(&*snapshot.map(), &*before.map());
+    for since in 0..=80 {
+        assert!(bits(&snapshot, since) == bits(&before, since), "the patch since {since} differs");
+    }
+    let mended = store.stored_map(SITE, LEVEL).await.unwrap().unwrap();
+    assert_eq!(mended.rows.chains.len(), sound.rows.chains.len());
+    drop(level);
+    levels.shutdown().await;
 }

@@ -232,15 +232,16 @@ async fn a_preview_tells_what_changes_and_changes_nothing(database: Database) {
     let before = submit_all(&level, &all).await;
     let check = async |preview: &v1::RevertPreview, to: &mapfold_map::level::LevelMap| {
         let patch = diff(&level.snapshot().map(), to);
-        let told = [preview.segments, preview.clusters, preview.tiles]
+        let told = [preview.segments, preview.clusters, preview.chains, preview.tiles]
             .map(|counts| [(counts.new + counts.changed) as usize, counts.removed as usize]);
         let changed = [
             [patch.segments.len(), patch.removed_segments.len()],
             [patch.clusters.len(), patch.removed_clusters.len()],
+            [patch.chains.len(), patch.removed_chains.len()],
             [patch.tiles.len(), patch.removed_tiles.len()],
         ];
         assert_eq!(told, changed);
-        let features: usize = changed[..2].iter().flatten().sum();
+        let features: usize = changed[..3].iter().flatten().sum();
         assert_eq!(preview.features.len(), features.min(200));
         assert_eq!(preview.more_features, features > 200);
     };

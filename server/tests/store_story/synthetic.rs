@@ -111,6 +111,10 @@ fn segments(numbers: &mut Numbers, at: [f64; 2], heading: f64) -> Vec<v1::Observ
     let mut seen = Vec::new();
     for [p, q] in WALLS {
         let (a, b) = (numbers.between(0.0, 0.5), numbers.between(0.55, 1.0));
+        // Now and then a look reaches as far as the corner.
+        let (a, low) =
+            if a < 0.1 { (0.0, v1::EndKind::Corner) } else { (a, v1::EndKind::Occluded) };
+        let (b, high) = if b > 0.9 { (1.0, v1::EndKind::Corner) } else { (b, v1::EndKind::Jump) };
         let point = |t: f64| [p[0] + (q[0] - p[0]) * t - at[0], p[1] + (q[1] - p[1]) * t - at[1]];
         let turn = |d: [f64; 2]| {
             let (s, c) = heading.sin_cos();
@@ -135,10 +139,8 @@ fn segments(numbers: &mut Numbers, at: [f64; 2], heading: f64) -> Vec<v1::Observ
             from_m: t.min(u),
             to_m: t.max(u),
             facing: v1::Facing::Origin,
-            ends: [
-                v1::ObservedEnd { kind: v1::EndKind::Occluded, sd_m: 0.02 },
-                v1::ObservedEnd { kind: v1::EndKind::Jump, sd_m: 0.02 },
-            ],
+            ends: if t < u { [low, high] } else { [high, low] }
+                .map(|kind| v1::ObservedEnd { kind, sd_m: 0.02 }),
             points: 10 + numbers.below(90) as u32,
             seen_through_m: Vec::new(),
         });

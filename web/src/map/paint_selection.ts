@@ -5,6 +5,7 @@ import type { Theme } from "../palette";
 import type { State } from "../state";
 import type { Segment } from "../wire";
 import { xScreenFromLevel, yScreenFromLevel, type Frame } from "./frame";
+import { traceChain } from "./paint_chains";
 import { tracePolygon } from "./paint_clusters";
 
 const HALO_PX = 9;
@@ -28,6 +29,13 @@ export function paintSelection(frame: Frame, state: State, theme: Theme): void {
       const cluster = content.clusters.get(selection.id);
       if (cluster === undefined) break;
       tracePolygon(frame, cluster);
+      pen.stroke();
+      break;
+    }
+    case "chain": {
+      const chain = content.chains.get(selection.id);
+      if (chain === undefined) break;
+      traceChain(frame, chain);
       pen.stroke();
       break;
     }

@@ -19,6 +19,7 @@ import { isSilent, robotsHere, samePlace, tileEdgeM, type State } from "../state
 import type { Store } from "../store";
 import { batchesOf } from "./batches";
 import type { Frame } from "./frame";
+import { paintChains } from "./paint_chains";
 import { paintClusters } from "./paint_clusters";
 import { paintGrid } from "./paint_grid";
 import { paintPreview } from "./paint_preview";
@@ -110,6 +111,9 @@ export function createMapView(options: MapViewOptions): MapView {
     clusters: (frame) => {
       paintClusters(frame, state.content.clusters.values(), { slots: state.slots, theme: theme() });
     },
+    chains: (frame) => {
+      paintChains(frame, state.content.chains.values(), theme());
+    },
     segments: (frame) => {
       piecesPainted = paintSegments(frame, batches(state.content.segments, state.slots), theme());
     },
@@ -145,7 +149,7 @@ export function createMapView(options: MapViewOptions): MapView {
     view,
     controls: [],
     interactions: defaultInteractions({ altShiftDragRotate: false, pinchRotate: false }),
-    layers: [layers.raster, layers.grid, layers.clusters, selectionLayer, layers.segments, layers.robots],
+    layers: [layers.raster, layers.grid, layers.clusters, layers.chains, selectionLayer, layers.segments, layers.robots],
   });
 
   /** What the page itself has last set; anything else is the operator's doing. */

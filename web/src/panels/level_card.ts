@@ -8,7 +8,7 @@ import { count, counted, lengthInWords } from "../words";
 
 export function createLevelCard(parent: HTMLElement): (state: State) => void {
   const title = el("h2");
-  const figures = ["Contributions", "Segments", "Clusters", "Tiles"].map((name) => {
+  const figures = ["Contributions", "Segments", "Clusters", "Chains", "Tiles"].map((name) => {
     const value = el("dd");
     return { value, element: el("div", {}, value, el("dt", { text: name })) };
   });
@@ -21,7 +21,7 @@ export function createLevelCard(parent: HTMLElement): (state: State) => void {
   return (state) => {
     const { level, content } = state;
     setText(title, level === null ? "Level" : level.name);
-    const values = [level?.counts.contributions ?? 0, content.segments.size, content.clusters.size, tiles(content)];
+    const values = [level?.counts.contributions ?? 0, content.segments.size, content.clusters.size, content.chains.size, tiles(content)];
     figures.forEach(({ value }, index) => {
       setText(value, level === null ? "–" : count(values[index] ?? 0));
     });

@@ -1,12 +1,12 @@
 // What the operator has chosen on the map, in figures.
 
 import { competenceInWords } from "../competence";
-import { angleSd, lengthOf, middleOf, offsetSd } from "../geometry";
+import { angleSd, areaOf, edgesOf, ellipse95, lengthOf, middleOf, offsetSd } from "../geometry";
 import { el, setShown, setText } from "../dom";
 import { isSilent, type State } from "../state";
 import type { Store } from "../store";
-import type { Cluster, EndKind, RobotDescription, Segment } from "../wire";
-import { ago, coordinate, count, counted, degrees, instant, lengthInWords, listed } from "../words";
+import type { Chain, Cluster, EndKind, RobotDescription, Segment } from "../wire";
+import { ago, coordinate, count, counted, degrees, fixed, instant, lengthInWords, listed } from "../words";
 
 /** A card's title and its lines. */
 export interface Description {
@@ -32,6 +32,10 @@ export function describe(state: State): Description | null {
     case "cluster": {
       const cluster = content.clusters.get(selection.id);
       return cluster === undefined ? null : describeCluster(cluster, state);
+    }
+    case "chain": {
+      const chain = content.chains.get(selection.id);
+      return chain === undefined ? null : describeChain(chain, state);
     }
     case "robot": {
       const robot = state.robots.find((one) => one.robot === selection.id);
@@ -59,12 +63,51 @@ function describeSegment(segment: Segment, state: State): Description {
       ["Offset sd", `${lengthInWords(sd)}, of it ${lengthInWords(shared)} shared`],
       ["Angle sd", degrees(angleSd(segment.covariance), 2)],
       ["Ends", first === undefined || last === undefined ? "–" : `${END_WORDS[first]}, ${END_WORDS[last]}`],
+      ...chainsWith(segment.id, state).map((chain): [string, string] => ["Part of", chainInWords(chain)]),
       ["Line", `ρ ${coordinate(segment.rho_m)}, α ${degrees(segment.alpha_rad)}`],
       ["First seen", instant(segment.first_seen)],
       ["Last seen", instant(segment.last_seen)],
     ],
   };
 }
+
+const CHAIN_WORDS: Readonly<Record<Chain["kind"], string>> = {
+  polyline: "polyline",
+  obstacle: "obstacle",
+  room: "room",
+};
+
+function chainInWords(chain: Chain): string {
+  return `${CHAIN_WORDS[chain.kind]} of ${counted(chain.segments.length, "wall")}`;
+}
+
+function chainsWith(segment: string, state: State): Chain[] {
+  return [...state.content.chains.values()].filter((chain) => chain.segments.includes(segment));
+}
+
+function describeChain(chain: Chain, state: State): Description {
+  const length = edgesOf(chain).reduce((sum, [x0, y0, x1, y1]) => sum + Math.hypot(x1 - x0, y1 - y0), 0);
+  const worst = Math.max(...chain.covariances.map(([[xx, xy], [, yy]]) => ellipse95(xx, xy, yy).majorM));
+  return {
+    title: chain.closed ? "Polygon" : "Polyline",
+    lines: [
+      ["What", `${chainInWords(chain)}${chain.closed ? `, ${AREA_WORDS[chain.kind]}` : ""}`],
+      ["Quality", `at least ${counted(chain.quality, "look")} each`],
+      ["Seen by", names(chain.robots, state)],
+      ["Length", lengthInWords(length)],
+      ...(chain.closed ? [["Area", `${fixed(areaOf(chain.vertices_m), 1)} m²`] as const] : []),
+      ["Vertices", `${count(chain.vertices_m.length)}, 95 % within ${lengthInWords(worst)}`],
+      ["First seen", instant(chain.first_seen)],
+      ["Last seen", instant(chain.last_seen)],
+    ],
+  };
+}
+
+const AREA_WORDS: Readonly<Record<Chain["kind"], string>> = {
+  polyline: "",
+  obstacle: "free outside",
+  room: "free inside",
+};
 
 function describeCluster(cluster: Cluster, state: State): Description {
   const [[xx], [, yy]] = cluster.covariance;

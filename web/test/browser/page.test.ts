@@ -122,12 +122,14 @@ describe("signing in", () => {
 });
 
 describe("the map", () => {
-  it("shows segments, clusters, robots and occupancy", async () => {
+  it("shows segments, clusters, chains, robots and occupancy", async () => {
     await open(SIGNED_IN);
     await caughtUp();
-    const { segments, clusters, tiles } = mock.ground.describe().counts;
+    const { segments, clusters, chains = 0, tiles } = mock.ground.describe().counts;
     expect(await fact("segments")).toBe(String(segments));
     expect(await fact("clusters")).toBe(String(clusters));
+    expect(chains).toBeGreaterThan(0);
+    expect(await fact("chains")).toBe(String(chains));
     expect(await fact("tiles")).toBe(String(tiles));
     expect(await fact("robots")).toBe("3");
     expect(Number(await fact("tilesLoaded"))).toBeGreaterThan(0);

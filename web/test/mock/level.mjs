@@ -6,6 +6,7 @@ import { buildWalls, castRay, ROUTES } from "./world.mjs";
 import { createRandom, normal } from "./random.mjs";
 
 /** @typedef {import("../../src/wire").Segment} Segment */
+/** @typedef {import("../../src/wire").Chain} Chain */
 /** @typedef {import("../../src/wire").Cluster} Cluster */
 /** @typedef {import("../../src/wire").TileAddress} TileAddress */
 /** @typedef {import("../../src/wire").SensorClass} SensorClass */
@@ -65,6 +66,8 @@ export function createMockLevel({ nowMs, seed = 1 }) {
   let segments = new Map();
   /** @type {Map<string, { cluster: Cluster, revision: number }>} */
   let clusters = new Map();
+  /** @type {Map<string, { chain: Chain, revision: number }>} */
+  let chains = new Map();
   /** @type {Map<string, Tile>} */
   let tiles = new Map();
   /** @type {{ id: string, revision: number }[]} */
@@ -173,18 +176,40 @@ export function createMockLevel({ nowMs, seed = 1 }) {
     const hull = walls.slice(first, first + 8).map(({ from }) => /** @type {[number, number]} */ ([from[0], from[1]]));
     const id = `mock-cluster-${first}`;
     const before = clusters.get(id)?.cluster;
-    clusters.set(id, {
+    /** @type {Cluster} */
+    const cluster = {
+      id,
+      hull_m: hull,
+      centroid_m: [hull.reduce((s, p) => s + p[0], 0) / 8, hull.reduce((s, p) => s + p[1], 0) / 8],
+      covariance: [[0.0004, 0], [0, 0.0004]],
+      points: (before?.points ?? 0) + 9,
+      quality: (before?.quality ?? 0) + 1,
+      robots: [...new Set([...(before?.robots ?? []), robot])].sort(),
+      first_seen: before?.first_seen ?? at,
+      last_seen: at,
+    };
+    clusters.set(id, { revision, cluster });
+    addChain(cluster);
+  };
+
+  /**
+   * A chain around a pillar: real ones come of walls, but to the page one outline is as good.
+   * @param {Cluster} cluster
+   */
+  const addChain = ({ id, hull_m: hull, quality, robots: seenBy, first_seen, last_seen }) => {
+    chains.set(`${id}.0`, {
       revision,
-      cluster: {
-        id,
-        hull_m: hull,
-        centroid_m: [hull.reduce((s, p) => s + p[0], 0) / 8, hull.reduce((s, p) => s + p[1], 0) / 8],
-        covariance: [[0.0004, 0], [0, 0.0004]],
-        points: (before?.points ?? 0) + 9,
-        quality: (before?.quality ?? 0) + 1,
-        robots: [...new Set([...(before?.robots ?? []), robot])].sort(),
-        first_seen: before?.first_seen ?? at,
-        last_seen: at,
+      chain: {
+        id: `${id}.0`,
+        kind: "obstacle",
+        closed: true,
+        vertices_m: [...hull].reverse(),
+        covariances: hull.map(() => [[0.0004, 0], [0, 0.0004]]),
+        segments: hull.map(() => id),
+        quality,
+        robots: seenBy,
+        first_seen,
+        last_seen,
       },
     });
   };
@@ -275,6 +300,7 @@ export function createMockLevel({ nowMs, seed = 1 }) {
       revision = 0;
       segments = new Map();
       clusters = new Map();
+      chains = new Map();
       tiles = new Map();
       removed = [];
       contributions = [];
@@ -291,7 +317,7 @@ export function createMockLevel({ nowMs, seed = 1 }) {
       revision,
       folded_revision: revision,
       bounds: null,
-      counts: { contributions: contributions.length, segments: segments.size, clusters: clusters.size, tiles: tiles.size },
+      counts: { contributions: contributions.length, segments: segments.size, clusters: clusters.size, chains: chains.size, tiles: tiles.size },
       published: null,
     }),
     robots: () => [...robots.values()].map(({ robot }) => robot),
@@ -303,6 +329,7 @@ export function createMockLevel({ nowMs, seed = 1 }) {
       revision,
       segments: [...segments.values()].filter((one) => one.revision > since).map((one) => one.segment),
       clusters: [...clusters.values()].filter((one) => one.revision > since).map((one) => one.cluster),
+      chains: [...chains.values()].filter((one) => one.revision > since).map((one) => one.chain),
       removed: { segments: removed.filter((one) => one.revision > since).map((one) => one.id), clusters: [], tiles: [] },
     }),
     /** @param {number} since @returns {import("../../src/wire").RasterChanges} */

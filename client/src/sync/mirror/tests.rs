@@ -254,6 +254,26 @@ async fn a_damaged_file_is_set_aside_and_everything_read_anew() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_file_from_before_chains_is_fetched_anew_without_a_word() {
+    let stub = with_contributions(0..9);
+    let folder = tempfile::tempdir().unwrap();
+    open(&folder).refresh(&api_of(&stub)).await.unwrap();
+    let path = folder.path().join("level.mirror");
+    let mut bytes = fs::read(&path).unwrap();
+    bytes[8..12].copy_from_slice(&1_u32.to_le_bytes());
+    fs::write(&path, &bytes).unwrap();
+    let mut mirror = open(&folder);
+    assert_eq!((mirror.revision(), mirror.frame()), (0, Some(FRAME)));
+    let refreshed = mirror.refresh(&api_of(&stub)).await.unwrap();
+    assert_eq!((refreshed.to_revision, refreshed.resync), (9, None));
+    assert_eq!(mirror.map(), stub.ledger().map());
+    bytes[8..12].copy_from_slice(&3_u32.to_le_bytes());
+    drop(mirror);
+    fs::write(&path, &bytes).unwrap();
+    assert_eq!(open(&folder).resync, Some(ResyncReason::DamagedFile));
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn its_geojson_has_a_line_for_each_solid_part_and_is_the_same_for_the_same_map() {
     let stub = with_contributions(0..12);
     let folder = tempfile::tempdir().unwrap();
@@ -267,7 +287,7 @@ async fn its_geojson_has_a_line_for_each_solid_part_and_is_the_same_for_the_same
     assert_eq!(json["coordinate_frame"]["unit"], "m");
     let features = json["features"].as_array().unwrap();
     let solids: usize = mirror.map().segments.values().map(|s| s.solid.len()).sum();
-    assert_eq!(features.len(), solids + mirror.map().clusters.len());
+    assert_eq!(features.len(), solids + mirror.map().clusters.len() + mirror.map().chains.len());
     assert!(solids > 0);
     for feature in features {
         let properties = &feature["properties"];

@@ -410,6 +410,7 @@ fn counts(map: &LevelMap) -> v1::Counts {
         in_force: 0,
         segments: map.segments.len() as i64,
         clusters: map.clusters.len() as i64,
+        chains: map.chains.len() as i64,
         tiles: map.tiles.len() as i64,
     }
 }
@@ -445,8 +446,8 @@ async fn vector(State(shared): State<Shared>, Query(query): Query<Since>) -> Res
     let ledger = shared.lock().unwrap();
     let patch = diff(ledger.history[query.since as usize].map(), ledger.map());
     let patch = wire_patch(&patch, query.since, ledger.revision(), false);
-    let v1::Patch { since, revision, segments, clusters, removed, .. } = patch;
-    written(200, &v1::VectorPatch { since, revision, segments, clusters, removed })
+    let v1::Patch { since, revision, segments, clusters, chains, removed, .. } = patch;
+    written(200, &v1::VectorPatch { since, revision, segments, clusters, chains, removed })
 }
 
 /// A site that is there already, or a page in gzip, whatever is asked for.
