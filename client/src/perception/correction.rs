@@ -14,7 +14,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::BeamState;
-use crate::sensor::{CorrectedRange, RangeTable, Scan, ScannerProfile};
+use crate::sensor::{CorrectedRange, RangeTable, Scan, ScanGeometry, ScannerProfile};
 
 /// How incidences are found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,10 +23,11 @@ pub struct CorrectionConfig {
     pub neighbours: usize,
     /// Fewest points of such a line, itself included.
     pub points_min: usize,
-    /// If the points on both sides are farther than this many deviations (rms) from their line,
-    /// one side is tried; three in a hundred lines of pure noise are beyond 1.5.
+    /// If the corrected points on both sides are farther than this many deviations (rms) from
+    /// their line, one side is tried; one or two in a hundred lines of pure noise are beyond 1.5.
     pub sides_rms: f64,
-    /// Points farther than this from every line lie on none.
+    /// Points farther than this from every line lie on none. Raw points, which are bent, are first
+    /// tried on one side beyond this.
     pub line_rms: f64,
     /// Neighbours are on one surface if it would be met at no more than this, radians: twice as far
     /// from grazing as the worst incidence of a table, for raw ranges are bent.
@@ -77,6 +78,10 @@ pub struct Corrector {
     config: CorrectionConfig,
     /// Tangent of the greatest incidence of a surface.
     steepest: f64,
+    /// One over every number of points that a line may have.
+    shares: Vec<f64>,
+    /// Where the beams of the last scan pointed; those of the next mostly point there too.
+    directions: (Option<ScanGeometry>, Vec<(f64, f64)>),
     sums: Vec<Sums>,
     spots: Vec<Spot>,
 }
@@ -119,7 +124,9 @@ impl Corrector {
         profile.correction.as_ref().map(|correction| Self {
             table: RangeTable::new(correction),
             steepest: config.surface_incidence_max.tan(),
+            shares: (0..=2 * config.neighbours + 1).map(|n| 1.0 / (n.max(1) as f64)).collect(),
             config,
+            directions: (None, Vec::new()),
             sums: Vec::new(),
             spots: Vec::new(),
         })
@@ -150,7 +157,7 @@ impl Corrector {
         into.incidences.clear();
         into.incidences.resize(states.len(), f64::NAN);
         let overlap = self.gather(scan, states);
-        self.find_incidences();
+        self.find_incidences(self.config.line_rms);
         for spot in &mut self.spots {
             let reading = scan.ranges[spot.beam];
             // What the table does not cover is dropped at the end; its place is still telling.
@@ -158,7 +165,7 @@ impl Corrector {
             (spot.range, spot.variance) =
                 found.map_or((reading, spot.variance), |(c, _)| (c.range, c.variance));
         }
-        self.find_incidences();
+        self.find_incidences(self.config.sides_rms);
         let count = self.spots.len() - 2 * overlap;
         for spot in &self.spots[overlap..overlap + count] {
             let reading = scan.ranges[spot.beam];
@@ -180,14 +187,22 @@ impl Corrector {
     /// first, and its first after the last. Answers how many are repeated at each end.
     fn gather(&mut self, scan: &Scan, states: &[BeamState]) -> usize {
         self.spots.clear();
+        let (known, directions) = &mut self.directions;
+        if *known != Some(scan.geometry) || directions.len() < states.len() {
+            directions.clear();
+            directions.extend((0..states.len()).map(|beam| {
+                let direction = scan.direction(beam);
+                (direction.x, direction.y)
+            }));
+            *known = Some(scan.geometry);
+        }
         for (beam, _) in states.iter().enumerate().filter(|(_, s)| **s == BeamState::Hit) {
             let range = scan.ranges[beam];
-            let direction = scan.direction(beam);
             // Noise as if met squarely; a reading far outside the table is none of its own.
             let variance = self.table.correct(range, 0.0).map_or(0.0, |c| c.variance);
             self.spots.push(Spot {
                 beam,
-                direction: (direction.x, direction.y),
+                direction: self.directions.1[beam],
                 range,
                 variance,
                 run: (0, 0),
@@ -223,8 +238,9 @@ impl Corrector {
             && (a.range - b.range).abs() <= a.range.min(b.range) * turn * self.steepest + noise
     }
 
-    /// The incidence of every spot, from the spots' places so far.
-    fn find_incidences(&mut self) {
+    /// The incidence of every spot, from the spots' places so far; one side is tried where both
+    /// are farther off their line than `sides_rms`.
+    fn find_incidences(&mut self, sides_rms: f64) {
         self.sums.clear();
         let mut sum = Sums::default();
         self.sums.push(sum);
@@ -249,14 +265,14 @@ impl Corrector {
             };
             let both = window(reach, reach);
             let found = match both {
-                Some(line) if line.rms_sq <= self.config.sides_rms.powi(2) => both,
+                Some(line) if line.rms_sq <= sides_rms * sides_rms => both,
                 _ => [both, window(2 * reach, 0), window(0, 2 * reach)]
                     .into_iter()
                     .flatten()
                     .min_by(|a, b| a.rms_sq.total_cmp(&b.rms_sq)),
             };
             let on_line = found.filter(|line| line.rms_sq <= self.config.line_rms.powi(2));
-            self.spots[at].incidence = on_line.map_or(UNKNOWN, |line| line.incidence);
+            self.spots[at].incidence = on_line.map_or(UNKNOWN, |line| line.incidence());
         }
     }
 
@@ -268,40 +284,49 @@ impl Corrector {
         }
         let (a, b) = (&self.sums[from], &self.sums[to + 1]);
         let n = count as f64;
-        let (x, y) = ((b.x - a.x) / n, (b.y - a.y) / n);
-        let xx = (b.xx - a.xx) / n - x * x;
-        let xy = (b.xy - a.xy) / n - x * y;
-        let yy = (b.yy - a.yy) / n - y * y;
+        let share = self.shares[count];
+        let (x, y) = (share * (b.x - a.x), share * (b.y - a.y));
+        let xx = share * (b.xx - a.xx) - x * x;
+        let xy = share * (b.xy - a.xy) - x * y;
+        let yy = share * (b.yy - a.yy) - y * y;
         // Twice the direction of the line: (d, 2 xy) over its length.
         let (d, sum) = (xx - yy, xx + yy);
-        let length = d.hypot(2.0 * xy);
+        let length = (d * d + 4.0 * xy * xy).sqrt();
         if length <= 0.0 {
             return None;
         }
+        // Range noise across the line, in the ratio of the squares of the cosine of the incidence.
+        // cos of twice the angle between beam and line is that of twice the incidence, negative.
         let (ex, ey) = direction;
-        // cos of twice the angle between beam and line, which is that of twice the incidence,
-        // negative.
         let twice = (d * (ex * ex - ey * ey) + 4.0 * xy * ex * ey) / length;
         let cosine_sq = (0.5 * (1.0 - twice)).clamp(0.0, 1.0);
-        let sine_sq = (0.5 * (1.0 + twice)).clamp(0.0, 1.0);
-        // Range noise across the line. A beam along the line still has some.
-        let across = (b.variance - a.variance) / n * cosine_sq.max(0.01);
+        // A beam along the line still has some noise across.
+        let across = (share * (b.variance - a.variance) * cosine_sq.max(0.01)).max(1e-12);
         let off = (0.5 * (sum - length)).max(0.0) * n / (n - 2.0);
-        Some(LocalLine {
-            incidence: Incidence {
-                angle: arc_tangent(sine_sq.sqrt(), cosine_sq.sqrt()),
-                variance: across / (0.5 * (sum + length) * n),
-            },
-            rms_sq: off / across.max(1e-12),
-        })
+        Some(LocalLine { twice, across, along: 0.5 * (sum + length) * n, rms_sq: off / across })
     }
 }
 
 #[derive(Debug, Clone, Copy)]
 struct LocalLine {
-    incidence: Incidence,
+    /// Cosine of twice the incidence, negative.
+    twice: f64,
+    /// Variance of a point across the line.
+    across: f64,
+    /// Sum of the squares of the points' distances along it from their middle.
+    along: f64,
     /// Mean square of the residuals over that of the noise.
     rms_sq: f64,
+}
+
+impl LocalLine {
+    fn incidence(&self) -> Incidence {
+        let (sine_sq, cosine_sq) = (1.0 + self.twice, 1.0 - self.twice);
+        Incidence {
+            angle: arc_tangent_sqrt(sine_sq.max(0.0), cosine_sq.max(0.0)),
+            variance: self.across / self.along,
+        }
+    }
 }
 
 /// The range that a reading means, and its noise.
@@ -322,13 +347,11 @@ fn corrected(
     Some((found, BeamNoise { variance: found.variance, shared }))
 }
 
-/// `atan2(y, x)` of two lengths to within 2e-6 rad, in a third of the time (Hastings 1955, sheet
-/// 11).
-fn arc_tangent(y: f64, x: f64) -> f64 {
+/// `atan2(sqrt(y), sqrt(x))` to within 1e-5 rad, in a third of the time (Hastings 1955, sheet 11).
+fn arc_tangent_sqrt(y: f64, x: f64) -> f64 {
     let (small, large) = if y < x { (y, x) } else { (x, y) };
-    let t = if large > 0.0 { small / large } else { 0.0 };
-    let s = t * t;
-    let angle = t
+    let s = if large > 0.0 { small / large } else { 0.0 };
+    let angle = s.sqrt()
         * (0.999_977_26
             + s * (-0.332_623_47
                 + s * (0.193_543_46
@@ -520,7 +543,10 @@ mod tests {
     fn the_arc_tangent_is_good_enough_for_any_table() {
         for i in 0..=2000 {
             let angle = FRAC_PI_2 * f64::from(i) / 2000.0;
-            assert!((arc_tangent(angle.sin(), angle.cos()) - angle).abs() < 1e-5, "{angle}");
+            assert!(
+                (arc_tangent_sqrt(angle.sin().powi(2), angle.cos().powi(2)) - angle).abs() < 1e-5,
+                "{angle}"
+            );
         }
     }
 }

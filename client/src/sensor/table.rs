@@ -100,6 +100,8 @@ struct Knot {
     reading: f64,
     range: f64,
     variance: f64,
+    /// Change of range and of variance with the reading, up to the next knot.
+    rise: (f64, f64),
 }
 
 /// The inverse response at one incidence: readings and ranges both strictly ascending.
@@ -131,12 +133,18 @@ impl Curve {
         let mut curve = Self {
             knots: blocks
                 .iter()
-                .map(|b| Knot { reading: b.reading, range: b.range, variance: 0.0 })
+                .map(|b| Knot {
+                    reading: b.reading,
+                    range: b.range,
+                    variance: 0.0,
+                    rise: (0.0, 0.0),
+                })
                 .collect(),
             cells: Vec::new(),
             cells_per_metre: 0.0,
         };
         let (first, last) = (curve.knots[0].reading, curve.knots[curve.knots.len() - 1].reading);
+        curve.lean();
         if last > first {
             let count = CELLS_PER_KNOT * curve.knots.len();
             curve.cells_per_metre = count as f64 / (last - first);
@@ -163,7 +171,18 @@ impl Curve {
         for (knot, variance) in curve.knots.iter_mut().zip(variances) {
             knot.variance = variance;
         }
+        curve.lean();
         curve
+    }
+
+    /// Notes how range and variance rise from each knot to the next.
+    fn lean(&mut self) {
+        for at in 1..self.knots.len() {
+            let (low, high) = (self.knots[at - 1], self.knots[at]);
+            let step = high.reading - low.reading;
+            self.knots[at - 1].rise =
+                ((high.range - low.range) / step, (high.variance - low.variance) / step);
+        }
     }
 
     /// Range and variance at a reading, if it is one of the table.
@@ -185,12 +204,9 @@ impl Curve {
         while at + 2 < self.knots.len() && self.knots[at + 1].reading <= reading {
             at += 1;
         }
-        let (low, high) = (&self.knots[at], &self.knots[at + 1]);
-        let share = (reading - low.reading) / (high.reading - low.reading);
-        Some((
-            low.range + share * (high.range - low.range),
-            low.variance + share * (high.variance - low.variance),
-        ))
+        let low = &self.knots[at];
+        let past = reading - low.reading;
+        Some((low.range + past * low.rise.0, low.variance + past * low.rise.1))
     }
 
     /// The range at a reading, the bias of the edges going on for ever.
