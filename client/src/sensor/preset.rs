@@ -6,10 +6,11 @@
 //! 0.9, so that claimed deviations are 1.05 to 1.8 times the real ones, careful and never bold
 //! (`tests/calibration.rs` repeats it on the committed log).
 //!
-//! The figures of the others come from their makers' data sheets and were not measured here: the
-//! statistical error stands as it is, the systematic error, which the sheets give as a bound, at
-//! half of it (two deviations to the bound). Who knows better writes a file, or measures a target
-//! (`mapfold-robot calibrate`).
+//! The figures of the others were not measured here. Those of `sick-lms1xx` and `rplidar` come from
+//! their makers' pages: the statistical error stands as it is, the systematic error, which makers
+//! give as a bound, at half of it (two deviations to the bound). Those of `sick-tim` and
+//! `hokuyo-utm` are the commonly quoted ones, not checked against a data sheet. Who knows better
+//! writes a file, or measures a target (`mapfold-robot calibrate`).
 
 use super::profile::{MountedAt, ScannerProfile, Sensors, SonarProfile};
 
