@@ -276,6 +276,7 @@ fn unreverted(error: &RevertError) -> Problem {
             of(413, "too_many_contributions", detail)
         }
         RevertError::Overtaken => of(409, "map_moved_on", detail),
+        RevertError::Behind { .. } => of(503, "revision_not_reached", detail),
         RevertError::Store(error) => of_store(error),
     }
 }
@@ -405,6 +406,13 @@ mod tests {
             assert!(!serde_json::to_string(&error.problem()).unwrap().contains("hunter2"));
             assert!(error.cause().unwrap().contains("hunter2"));
         }
+    }
+
+    #[test]
+    fn a_preview_that_comes_too_early_may_be_asked_for_again() {
+        let behind = RevertError::Behind { folded_revision: 5, revision: 7 };
+        let told = told(&ApiError::Revert(behind));
+        assert_eq!(told, (503, "revision_not_reached".to_owned(), true));
     }
 
     #[test]

@@ -28,10 +28,18 @@ pub enum RevertError {
     /// asking again with the same id tells.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// A preview came to no end: another act was faster, or the map is far behind its log, or the
-    /// level is closing. Asking again may help.
+    /// A preview came to no end: another act was faster, or the level is closing. Asking again may
+    /// help.
     #[error("The map went on meanwhile; ask again.")]
     Overtaken,
+    /// Nothing can be tried out on a map that is too far behind its log.
+    #[error("The map is still at revision {folded_revision} of {revision}; ask again in a moment.")]
+    Behind {
+        /// What the map has reached.
+        folded_revision: i64,
+        /// What it would have to reach.
+        revision: i64,
+    },
 }
 
 impl LevelHandle {
@@ -93,8 +101,9 @@ impl LevelHandle {
     async fn try_out(&self, kind: ActKind, plan: Plan) -> Result<v1::RevertPreview, RevertError> {
         let Plan { revision, covered, moved, shares } = plan;
         let snapshot = self.snapshot_at(revision, PREVIEW_PATIENCE).await;
-        if snapshot.folded_revision() < revision {
-            return Err(RevertError::Overtaken);
+        let folded_revision = snapshot.folded_revision();
+        if folded_revision < revision {
+            return Err(RevertError::Behind { folded_revision, revision });
         }
         let count = moved.len() as u32;
         let outcome = if moved.is_empty() {
