@@ -30,6 +30,8 @@ export interface LogState {
   reverts: readonly Revert[] | null;
 }
 
+const NO_CHANGES: ChangeCounts = { new: 0, changed: 0, removed: 0 };
+
 /** Before the panel is opened. */
 export const NO_LOG: LogState = {
   open: false,
@@ -113,6 +115,7 @@ export function previewInWords(
   const changes = [
     changesInWords(told.segments, "segment"),
     changesInWords(told.clusters, "cluster"),
+    changesInWords(told.chains ?? NO_CHANGES, "chain"),
     changesInWords(told.tiles, "tile"),
   ].filter((change) => change !== "");
   return [what, ...others, ...(changes.length === 0 ? ["The map would look the same."] : changes)];

@@ -81,11 +81,16 @@ describe("a preview in words", () => {
 
   it("tells what comes back, and what stays out", () => {
     const trial = { kind: "undo", revert: "r" } as const;
-    const preview = told({ contributions: 4, clusters: { new: 2, changed: 0, removed: 0 } });
+    const preview = told({
+      contributions: 4,
+      clusters: { new: 2, changed: 0, removed: 0 },
+      chains: { new: 1, changed: 0, removed: 0 },
+    });
     expect(previewInWords({ trial, told: preview }, name)).toEqual([
       "Puts 3 contributions of ADA back into the map.",
       "1 more stay out, because another revert covers them.",
       "Clusters: 2 new.",
+      "Chains: 1 new.",
     ]);
     expect(previewInWords({ trial, told: told({ moved: 0 }) }, name)[0]).toContain("Nothing would come back");
   });
