@@ -251,7 +251,7 @@ describe("the operator", () => {
     await page.waitForFunction(() => !window.location.hash.includes("x=30.00"));
     await caughtUp();
     const address = page.url();
-    expect(address).toContain("layers=raster:40,segments,robots&evidence=sonar");
+    expect(address).toContain("layers=raster:40,chains,segments,robots&evidence=sonar");
     await page.reload();
     await caughtUp();
     expect(page.url()).toBe(address);
