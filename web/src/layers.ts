@@ -28,7 +28,7 @@ export const LAYER_TITLES: Readonly<Record<LayerName, string>> = {
   raster: "Occupancy",
   grid: "Grid",
   clusters: "Clusters",
-  chains: "Polylines and polygons",
+  chains: "Chains",
   segments: "Segments",
   robots: "Robots",
 };
