@@ -1,5 +1,7 @@
 //! Following patches from the beginning leads to what a full fetch answers, in JSON and in CBOR.
 
+#![expect(clippy::expect_used, reason = "tests may stop at the first surprise")]
+
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -15,42 +17,65 @@ use mapfold_tests::server::Server;
 /// Scans that are played: enough for walls to be founded, merged, opened and dropped.
 const SCANS: usize = 600;
 
+/// Parts in which they are played: a mirror that follows must have been at the end of each.
+const PARTS: usize = 5;
+
 /// Things a page, far fewer than there are: every mirror must go through many pages.
 const PAGE: usize = 100;
 
-#[tokio::test]
-async fn a_mirror_that_follows_patches_equals_a_full_fetch() -> Result<(), Error> {
-    let server = Server::start(Database::Sqlite).await?;
+/// A mirror that follows while the fleet plays, and the revisions at which it was up to date.
+struct Follower {
+    accept: &'static str,
+    replica: Replica,
+    steps: BTreeSet<i64>,
+}
+
+impl Follower {
+    fn new(accept: &'static str) -> Self {
+        Self { accept, replica: Replica::default(), steps: BTreeSet::new() }
+    }
+
+    async fn follow(&mut self, level: &Level, until: i64) {
+        while self.replica.revision < until {
+            // The level is made by the first robot: until then there is nothing to follow.
+            if self.replica.follow(level, PAGE, self.accept).await.is_ok() {
+                self.steps.insert(self.replica.revision);
+            }
+            tokio::time::sleep(std::time::Duration::from_millis(10)).await;
+        }
+    }
+}
+
+async fn mirrors_equal_full_fetches(database: Database) -> Result<(), Error> {
+    let server = Server::start(database).await?;
     let folder = tempfile::tempdir().expect("a temporary folder");
     let log = Log::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("data/killian.log.gz"))?;
-    let part = folder.path().join("part.log.gz");
-    log.write_part(0, SCANS, &part)?;
-    let robots = fleet::cut(&Log::read(&part)?, folder.path())?;
     let level = Level::new(server.api()?, "mit", "floor");
 
     // Two mirrors follow while the fleet plays, each in its own words.
-    let following = |accept: &'static str| {
-        let level = level.clone();
-        async move {
-            let mut replica = Replica::default();
-            let mut steps = BTreeSet::new();
-            while replica.revision < SCANS as i64 {
-                // The level is made by the first robot: until then there is nothing to follow.
-                if replica.follow(&level, PAGE, accept).await.is_ok() {
-                    steps.insert(replica.revision);
-                }
-                tokio::time::sleep(std::time::Duration::from_millis(10)).await;
-            }
-            (replica, steps.len())
-        }
-    };
-    let (played, (json, json_steps), (cbor, cbor_steps)) = tokio::join!(
-        fleet::play(&server, "mit", "floor", &robots, folder.path()),
-        following(JSON),
-        following(CBOR)
-    );
-    played?;
-    assert!(json_steps + cbor_steps > 3, "the mirrors saw {json_steps}, {cbor_steps} revisions");
+    let (mut json, mut cbor) = (Follower::new(JSON), Follower::new(CBOR));
+    let ends = (1..=PARTS).map(|part| part * SCANS / PARTS);
+    let mut begin = 0;
+    for end in ends.clone() {
+        let folder = folder.path().join(end.to_string());
+        std::fs::create_dir(&folder).expect("a folder for a part");
+        let part = folder.join("part.log.gz");
+        log.write_part(begin, end, &part)?;
+        let robots = fleet::cut(&Log::read(&part)?, &folder)?;
+        let (played, (), ()) = tokio::join!(
+            fleet::play(&server, "mit", "floor", &robots, &folder),
+            json.follow(&level, end as i64),
+            cbor.follow(&level, end as i64)
+        );
+        played?;
+        begin = end;
+    }
+    for follower in [&json, &cbor] {
+        let missed: Vec<usize> =
+            ends.clone().filter(|end| !follower.steps.contains(&(*end as i64))).collect();
+        assert!(missed.is_empty(), "{} was never at {missed:?}", follower.accept);
+    }
+    let (json, cbor) = (json.replica, cbor.replica);
 
     let description = level.folded().await?;
     assert_eq!(description.revision, SCANS as i64);
@@ -96,4 +121,14 @@ async fn a_mirror_that_follows_patches_equals_a_full_fetch() -> Result<(), Error
         assert!(level.raster(description.revision, accept).await?.tiles.is_empty());
     }
     Ok(())
+}
+
+#[tokio::test]
+async fn a_mirror_that_follows_patches_equals_a_full_fetch_on_sqlite() -> Result<(), Error> {
+    mirrors_equal_full_fetches(Database::Sqlite).await
+}
+
+#[tokio::test]
+async fn a_mirror_that_follows_patches_equals_a_full_fetch_on_postgres() -> Result<(), Error> {
+    mirrors_equal_full_fetches(Database::new_postgres().await?).await
 }
