@@ -43,6 +43,7 @@ enum Properties<'a> {
         id: &'a str,
         kind: &'static str,
         quality: u32,
+        existence_nat: f64,
         rho_m: f64,
         alpha_rad: f64,
         covariance: [[f64; 2]; 2],
@@ -127,6 +128,7 @@ impl<'w, W: Write> Features<'w, W> {
                     id: &segment.id,
                     kind: "segment",
                     quality: segment.quality,
+                    existence_nat: interval.existence_nat,
                     rho_m: segment.rho_m,
                     alpha_rad: segment.alpha_rad,
                     covariance: segment.covariance,
@@ -224,6 +226,7 @@ mod tests {
                     from_m,
                     to_m,
                     ends: [v1::EndKind::Jump; 2],
+                    existence_nat: from_m,
                 })
                 .to_vec(),
             quality: 4,
@@ -258,6 +261,7 @@ mod tests {
             assert_eq!(feature["properties"]["id"], id);
             assert_eq!(feature["properties"]["kind"], "segment");
             assert_eq!(feature["properties"]["quality"], 4);
+            assert_eq!(feature["properties"]["existence_nat"], [-1.0, 1.5][n]);
         }
         let expected = serde_json::json!([[2.0, -1.0], [2.0, 0.5]]);
         assert_eq!(features[0]["geometry"]["coordinates"], expected);

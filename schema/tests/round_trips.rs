@@ -9,7 +9,7 @@ use mapfold_map::geometry::{
 };
 use mapfold_map::level::{Contribution, ContributionId, FeatureId, Patch, Provenance, RobotName};
 use mapfold_map::raster::{
-    EvidencePatch, SensorClass, TILE_CELLS, Tile, TileIndex, TileKey, TilePatch,
+    EvidencePatch, LogOdds, SensorClass, TILE_CELLS, Tile, TileIndex, TileKey, TilePatch,
 };
 use mapfold_map::vector::{
     Chain, ChainId, ChainKind, Cluster, EndKind, Facing, ObservedCluster, ObservedEnd,
@@ -87,14 +87,15 @@ fn feature() -> impl Strategy<Value = FeatureId> {
 }
 
 fn solids() -> impl Strategy<Value = Vec<SolidInterval>> {
-    let piece = (0..5_000_i64, 1..100_000_i64, [end_kind(), end_kind()]);
+    let piece = (0..5_000_i64, 1..100_000_i64, [end_kind(), end_kind()], any::<i32>());
     (-1_000_000_000..1_000_000_000_i64, vec(piece, 1..5)).prop_map(|(start, pieces)| {
         let mut free_from = start;
         let mut solids = Vec::new();
-        for (gap, length, ends) in pieces {
+        for (gap, length, ends, existence) in pieces {
             let from = free_from + gap;
             free_from = from + length;
-            solids.push(SolidInterval { span: Interval { from, to: free_from }, ends });
+            let (span, existence) = (Interval { from, to: free_from }, LogOdds(existence));
+            solids.push(SolidInterval { span, ends, existence });
         }
         solids
     })
@@ -423,6 +424,7 @@ fn a_mirror_refuses_what_it_could_not_keep_exactly() {
         solid: vec![SolidInterval {
             span: Interval { from: -5, to: 7 },
             ends: [EndKind::Jump, EndKind::Corner],
+            existence: LogOdds(578),
         }],
         looks: 2,
         robots: vec!["r1".into()],
@@ -435,7 +437,7 @@ fn a_mirror_refuses_what_it_could_not_keep_exactly() {
         map_segment(&wire).map_err(|v| (v.code, v.pointer)).err()
     };
     assert_eq!(refused(|_| ()), None);
-    let cases: [Refusal; 11] = [
+    let cases: [Refusal; 12] = [
         ("negative", "/rho_m", |s| s.rho_m = -3.0),
         ("not_finite", "/rho_m", |s| s.rho_m = f64::NAN),
         ("not_wrapped", "/alpha_rad", |s| s.alpha_rad = 3.5),
@@ -444,6 +446,7 @@ fn a_mirror_refuses_what_it_could_not_keep_exactly() {
         ("not_millimetres", "/solid/0/to_m", |s| s.solid[0].to_m = 0.0071),
         ("out_of_order", "/solid/0", |s| s.solid[0].to_m = -0.005),
         ("out_of_range", "/solid/0/from_m", |s| s.solid[0].from_m = -1e300),
+        ("not_hundredths", "/solid/0/existence_nat", |s| s.solid[0].existence_nat = 2.891),
         ("bad_feature_id", "/id", |s| s.id.clear()),
         ("bad_slug", "/robots/0", |s| s.robots[0].clear()),
         ("bad_instant", "/last_seen", |s| s.last_seen.clear()),

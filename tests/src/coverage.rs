@@ -66,7 +66,12 @@ mod tests {
             covariance_independent: [[1e-4, 0.0], [0.0, 1e-4]],
             covariance_dependent: [[0.0, 0.0], [0.0, 0.0]],
             facing: Facing::Origin,
-            solid: vec![SolidInterval { from_m: -5.0, to_m: top, ends: [EndKind::Jump; 2] }],
+            solid: vec![SolidInterval {
+                from_m: -5.0,
+                to_m: top,
+                ends: [EndKind::Jump; 2],
+                existence_nat: 2.89,
+            }],
             quality: 1,
             robots: Vec::new(),
             first_seen: String::new(),

@@ -200,7 +200,12 @@ mod tests {
             covariance_dependent: [[0.0, 0.0], [0.0, 0.0]],
             facing: Facing::Origin,
             // A quarter turn left of "up" is "left": the wall lies on the negative side.
-            solid: vec![SolidInterval { from_m: -length, to_m: 0.0, ends: [EndKind::Jump; 2] }],
+            solid: vec![SolidInterval {
+                from_m: -length,
+                to_m: 0.0,
+                ends: [EndKind::Jump; 2],
+                existence_nat: 2.89,
+            }],
             quality: 1,
             robots: Vec::new(),
             first_seen: String::new(),

@@ -1366,6 +1366,12 @@ export interface components {
             ends: components["schemas"]["EndKind"][];
             /**
              * Format: double
+             * @description Log-odds that it is there, in whole hundredths of a nat: looks that saw it speak for it,
+             *     looks that saw through it against it.
+             */
+            existence_nat: number;
+            /**
+             * Format: double
              * @description Lower end along the line, from the foot point of the level's origin: whole millimetres.
              */
             from_m: number;

@@ -34,6 +34,11 @@ export function piecesOf(segment: Segment): Piece[] {
   });
 }
 
+/** Log-odds that the least certain of the solid pieces is there, nats. */
+export function leastExistence(segment: Segment): number {
+  return Math.min(...segment.solid.map((interval) => interval.existence_nat));
+}
+
 /** Total length of the solid pieces. */
 export function lengthOf(segment: Segment): number {
   return segment.solid.reduce((sum, interval) => sum + interval.to_m - interval.from_m, 0);

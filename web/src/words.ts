@@ -41,6 +41,12 @@ function trimmed(value: number): string {
   return String(Number(value.toPrecision(3)));
 }
 
+/** Log-odds in nats as a probability, never rounded up to certainty: "95 %", "99.9 %". */
+export function likelihood(nat: number): string {
+  const percent = 100 / (1 + Math.exp(-nat));
+  return percent < 99 ? `${fixed(percent, 0)} %` : `${fixed(Math.min(percent, 99.9), 1)} %`;
+}
+
 /** How long ago, roughly. */
 export function ago(sinceMs: number, nowMs: number): string {
   const seconds = Math.max(0, Math.floor((nowMs - sinceMs) / 1000));

@@ -28,8 +28,8 @@ describe("lines", () => {
   it("have a piece for each solid interval", () => {
     const wall = segment("w", {
       solid: [
-        { from_m: -4, to_m: -1, ends: ["corner", "jump"] },
-        { from_m: 1, to_m: 5, ends: ["jump", "corner"] },
+        { from_m: -4, to_m: -1, ends: ["corner", "jump"], existence_nat: 8.67 },
+        { from_m: 1, to_m: 5, ends: ["jump", "corner"], existence_nat: 8.67 },
       ],
     });
     expect(piecesOf(wall)).toEqual([

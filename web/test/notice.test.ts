@@ -56,6 +56,8 @@ describe("what is chosen", () => {
   it("is told of a segment: quality, robots, sds, times", () => {
     expect(lines("segment", "w")).toMatchObject({
       Quality: "3 looks",
+      // 1 / (1 + exp(-8.67)) = 0.99983.
+      "Is there": "99.9 % or more",
       "Seen by": "ada",
       Length: "3 m in 1 piece",
       // sqrt(0.0004 + 2.5^2 * 0.0001) across the wall's middle.

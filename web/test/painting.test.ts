@@ -48,7 +48,7 @@ describe("batches", () => {
         segment("a", { robots: ["bo"] }),
         segment("b", { robots: ["ada", "bo"] }),
         segment("c", { robots: ["ada"] }),
-        segment("d", { robots: ["bo"], solid: [{ from_m: 0, to_m: 1, ends: ["jump", "jump"] }, { from_m: 2, to_m: 3, ends: ["jump", "jump"] }] }),
+        segment("d", { robots: ["bo"], solid: [{ from_m: 0, to_m: 1, ends: ["jump", "jump"], existence_nat: 8.67 }, { from_m: 2, to_m: 3, ends: ["jump", "jump"], existence_nat: 8.67 }] }),
       ],
       slots,
     );
@@ -70,7 +70,7 @@ describe("batches", () => {
     expect(paintSegments(frame(pen), batchesOf([away], slots), LIGHT)).toBe(0);
     expect(calls.some((call) => call.startsWith("lineTo"))).toBe(false);
     // One that crosses the screen with both ends outside is there.
-    const across = segment("b", { rho_m: 5, solid: [{ from_m: -50, to_m: 50, ends: ["jump", "jump"] }] });
+    const across = segment("b", { rho_m: 5, solid: [{ from_m: -50, to_m: 50, ends: ["jump", "jump"], existence_nat: 8.67 }] });
     expect(paintSegments(frame(pen), batchesOf([across], slots), LIGHT)).toBe(1);
   });
 

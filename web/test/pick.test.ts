@@ -8,7 +8,7 @@ const state: State = [
   {
     kind: "vector",
     patch: vectorPatch(0, 1, {
-      segments: [segment("wall"), segment("far", { solid: [{ from_m: 10, to_m: 12, ends: ["jump", "jump"] }] })],
+      segments: [segment("wall"), segment("far", { solid: [{ from_m: 10, to_m: 12, ends: ["jump", "jump"], existence_nat: 8.67 }] })],
       clusters: [cluster("thing")],
     }),
   } as const,
@@ -43,7 +43,7 @@ describe("picking", () => {
   });
 
   it("finds a chain at its corners, along its edges and inside an obstacle, below all else", () => {
-    const wall = segment("w", { rho_m: 5, alpha_rad: Math.PI / 2, solid: [{ from_m: -7, to_m: -5, ends: ["corner", "corner"] }] });
+    const wall = segment("w", { rho_m: 5, alpha_rad: Math.PI / 2, solid: [{ from_m: -7, to_m: -5, ends: ["corner", "corner"], existence_nat: 8.67 }] });
     const patch = vectorPatch(0, 2, { segments: [wall], chains: [chain("box")] });
     const boxed = update(state, { kind: "vector", patch });
     expect(pick(boxed, [5.1, 4.9], RESOLUTION)).toEqual({ kind: "chain", id: "box" });
@@ -62,7 +62,7 @@ describe("picking", () => {
   it("prefers robots to what is below them", () => {
     const above = update(state, {
       kind: "vector",
-      patch: vectorPatch(1, 2, { segments: [segment("under", { rho_m: 0, solid: [{ from_m: -3, to_m: 3, ends: ["jump", "jump"] }] })] }),
+      patch: vectorPatch(1, 2, { segments: [segment("under", { rho_m: 0, solid: [{ from_m: -3, to_m: 3, ends: ["jump", "jump"], existence_nat: 8.67 }] })] }),
     });
     expect(pick(above, [0.1, 0], RESOLUTION)).toEqual({ kind: "robot", id: "ada" });
     expect(pick(above, [0.1, 2], RESOLUTION)).toEqual({ kind: "segment", id: "under" });

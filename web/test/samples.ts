@@ -41,7 +41,7 @@ export function segment(id: string, fields: Partial<Segment> = {}): Segment {
       [0, 0],
     ],
     facing: "origin",
-    solid: [{ from_m: 1, to_m: 4, ends: ["corner", "jump"] }],
+    solid: [{ from_m: 1, to_m: 4, ends: ["corner", "jump"], existence_nat: 8.67 }],
     quality: 3,
     robots: ["ada"],
     first_seen: "2026-11-22T11:00:00Z",

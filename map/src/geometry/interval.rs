@@ -32,6 +32,11 @@ impl Interval {
         self.to as f64 / 1e3
     }
 
+    /// Length of what both cover, millimetres.
+    pub fn overlap(&self, other: &Self) -> i64 {
+        (-self.gap(other)).max(0)
+    }
+
     /// Distance between the two intervals, negative where they overlap.
     pub fn gap(&self, other: &Self) -> i64 {
         self.from.max(other.from) - self.to.min(other.to)

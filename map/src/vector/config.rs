@@ -38,6 +38,13 @@ pub struct VectorConfig {
     /// A wall is seen through where more than this share of the looks at it went through it, and
     /// more than one.
     pub through_share: f64,
+    /// How probably a look that should see a wall sees it.
+    pub detection_probability: f64,
+    /// How probably a look sees a wall where none is.
+    pub false_alarm_probability: f64,
+    /// A piece of wall fades from the map where the log-odds that it is there are not above this,
+    /// nats.
+    pub existence_min: f64,
     /// A wall is seen through where this much of it in a row lies in free cells only, metres.
     pub seen_through_min: f64,
     /// Shorter pieces are not published, metres.
@@ -87,6 +94,9 @@ impl VectorConfig {
         thin_reach: 1.0,
         free_look: 0.4,
         through_share: 0.1,
+        detection_probability: 0.9,
+        false_alarm_probability: 0.05,
+        existence_min: 1.5,
         seen_through_min: 0.10,
         length_min: 0.2,
         duplicate_offset: 0.18,

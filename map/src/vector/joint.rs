@@ -124,6 +124,7 @@ mod tests {
 
     use super::*;
     use crate::geometry::{Interval, Level, Line, tangent};
+    use crate::raster::LogOdds;
     use crate::vector::{Facing, Segment, SolidInterval};
 
     const CONFIG: VectorConfig = VectorConfig::STANDARD;
@@ -155,6 +156,7 @@ mod tests {
             solid: vec![SolidInterval {
                 span: Interval::from_metres(ends[0], ends[1]),
                 ends: [EndKind::Corner; 2],
+                existence: LogOdds(289),
             }],
             looks: 1,
             robots: Vec::new(),

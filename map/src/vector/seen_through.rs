@@ -40,8 +40,17 @@ const CELLS_BESIDE: i32 = 1;
 /// Cells behind a line that only beams through it reach: hits smear their evidence less deep.
 const CELLS_BEHIND: [i32; 2] = [2, 3];
 
-/// The parts of `pieces` (ascending, disjoint) that scanners have looked through. Two things
-/// count, sample by sample:
+/// What the grid says against a wall.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct SeenThrough {
+    /// The parts that scanners have looked through, ascending, disjoint.
+    pub(super) open: Vec<Interval>,
+    /// How many looks went through, where any did, open or not; ascending, disjoint.
+    pub(super) looks: Vec<(Interval, f64)>,
+}
+
+/// Where scanners have looked through `pieces` (ascending, disjoint). Two things open them, sample by
+/// sample:
 /// * the cells on and beside the line are all free, or
 /// * the cells just behind it are free by more than one look, and by more than a share
 ///   (`config.through_share`) of those that saw the wall there, not counting the looks at another face close behind it (`backs`),
@@ -54,7 +63,7 @@ pub(super) fn seen_through<E: Evidence>(
     backs: &[&Wall],
     grid: &E,
     config: &VectorConfig,
-) -> Vec<Interval> {
+) -> SeenThrough {
     let resolution = grid.resolution();
     let free_below = LogOdds::from_nat(config.free_below).0;
     let one_look = LogOdds::from_nat(config.free_look).0.max(1);
@@ -62,7 +71,7 @@ pub(super) fn seen_through<E: Evidence>(
     let step = ((resolution * 1e3).round() as i64).max(1);
     let least = (config.seen_through_min * 1e3).round() as i64;
     let mut reader = Reader { grid, tile: None };
-    let mut through = Vec::new();
+    let (mut through, mut went_through) = (Vec::new(), Vec::new());
     for piece in pieces {
         let mut open: Option<i64> = None;
         // Samples sit on multiples of the step, so that they do not move when the piece grows.
@@ -75,11 +84,14 @@ pub(super) fn seen_through<E: Evidence>(
                 (-CELLS_BESIDE..=CELLS_BESIDE).all(|cells| value(cells) < free_below);
             let seen = lies_in_free_space || {
                 let behind = CELLS_BEHIND.iter().map(|cells| value(-cells)).max().unwrap_or(0);
-                let through = f64::from(-behind.min(0)) / f64::from(one_look);
-                let others = || backs.iter().map(|back| back.looks_beside(&p)).sum::<i64>() as f64;
-                let looks = wall.looks_at(middle) as f64;
-                let allowed = (config.through_share * looks).max(1.0);
-                through > allowed && through - others() > allowed
+                let mut looks = f64::from(-behind.min(0)) / f64::from(one_look);
+                if looks > 0.0 {
+                    looks -= backs.iter().map(|back| back.looks_beside(&p)).sum::<i64>() as f64;
+                }
+                if looks > 0.0 {
+                    went_through.push((Interval { from: at, to: at + step }, looks));
+                }
+                looks > (config.through_share * wall.looks_at(middle) as f64).max(1.0)
             };
             match (seen, open) {
                 (true, None) => open = Some(at),
@@ -96,7 +108,7 @@ pub(super) fn seen_through<E: Evidence>(
         }
         through.retain(|i| i.length() >= least || i.from <= piece.from || i.to >= piece.to);
     }
-    through
+    SeenThrough { open: through, looks: went_through }
 }
 
 /// Whether scanners have looked through all of `points`.

@@ -2,6 +2,7 @@
 
 use crate::geometry::{Covariance, Interval, Level, Line, Robot, UncertainLine};
 use crate::level::RobotName;
+use crate::raster::LogOdds;
 
 /// The side of a supporting line from which it is seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -71,6 +72,9 @@ pub struct SolidInterval {
     pub span: Interval,
     /// What the lower and the upper end are.
     pub ends: [EndKind; 2],
+    /// Log-odds that it is there, from the looks that saw it and those that say they saw through
+    /// it, averaged along it.
+    pub existence: LogOdds,
 }
 
 /// A straight piece of wall of the map: one supporting line and the parts of it that are solid.

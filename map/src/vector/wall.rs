@@ -1,6 +1,7 @@
 //! One wall: the fused line of a group and the parts of it that were seen.
 
 use super::fusion::{FusedLine, fuse};
+use super::seen_through::SeenThrough;
 use super::sighting::Sighting;
 use super::{EndKind, Facing, VectorConfig};
 use crate::geometry::{
@@ -8,6 +9,7 @@ use crate::geometry::{
     union_intervals, unit_normal,
 };
 use crate::level::{FeatureId, RobotName};
+use crate::raster::LogOdds;
 
 /// A wall before the grid and its neighbours have had their say about which parts are published.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,6 +25,8 @@ pub(super) struct Wall {
     pub(super) seen: Vec<Interval>,
     /// From where on how many looks cover it, ascending: millimetres along `line`, count.
     covers: Vec<(i64, i64)>,
+    /// From where on how many looks say that they saw through it, ascending.
+    throughs: Vec<(i64, i64)>,
     /// Where looks ended, and how: millimetres along `line`.
     ends: Vec<(i64, EndKind)>,
     pub(super) looks: u32,
@@ -84,11 +88,11 @@ impl Wall {
         let openings = openings
             .iter()
             .flat_map(|of_look| union_intervals(of_look, 0))
-            .flat_map(|opening| [(opening.from, 1), (opening.to, -1)])
-            .collect();
+            .flat_map(|opening| [(opening.from, 1), (opening.to, -1)]);
+        let throughs = counts(openings.collect());
         let not_there = [
             thinly_covered(&covers, config.thin_share, config.thin_reach),
-            open(&covers, &counts(openings), config.through_share),
+            open(&covers, &throughs, config.through_share),
         ];
         let seen = subtract_intervals(
             &union_intervals(&seen, BRIDGE_MM),
@@ -106,6 +110,7 @@ impl Wall {
             facing,
             seen,
             covers,
+            throughs,
             ends,
             looks,
             robots,
@@ -125,6 +130,28 @@ impl Wall {
     /// How many observations cover the wall at `at` millimetres.
     pub(super) fn looks_at(&self, at: i64) -> i64 {
         count_at(&self.covers, at)
+    }
+
+    /// Log-odds that the wall is there, averaged along `piece`: every look that covers it speaks for
+    /// it; every look that went through it speaks against it, whether it says so itself or the grid
+    /// does (`through`), whichever tells of more.
+    pub(super) fn existence(
+        &self,
+        piece: Interval,
+        through: &SeenThrough,
+        config: &VectorConfig,
+    ) -> LogOdds {
+        let (detection, alarm) = (config.detection_probability, config.false_alarm_probability);
+        let in_grid: f64 = through
+            .looks
+            .iter()
+            .map(|(stretch, looks)| stretch.overlap(&piece) as f64 * looks)
+            .sum();
+        let missed = in_grid.max(total(&self.throughs, piece) as f64);
+        let seen = total(&self.covers, piece) as f64;
+        let nat =
+            (detection / alarm).ln() * seen + ((1.0 - detection) / (1.0 - alarm)).ln() * missed;
+        LogOdds::from_nat(nat / piece.length().max(1) as f64)
     }
 
     /// How many observations cover the wall abreast of `p`.
@@ -194,6 +221,18 @@ fn counts(mut changes: Vec<(i64, i64)>) -> Vec<(i64, i64)> {
 fn count_at(counts: &[(i64, i64)], at: i64) -> i64 {
     let next = counts.partition_point(|(from, _)| *from <= at);
     next.checked_sub(1).map_or(0, |i| counts[i].1)
+}
+
+/// The sum of the counts of all millimetres of `piece`.
+fn total(counts: &[(i64, i64)], piece: Interval) -> i64 {
+    let first = counts.partition_point(|(from, _)| *from <= piece.from);
+    let mut at = (piece.from, count_at(counts, piece.from));
+    let mut sum = 0;
+    for next in counts[first..].iter().take_while(|(from, _)| *from < piece.to) {
+        sum += at.1 * (next.0 - at.0);
+        at = *next;
+    }
+    sum + at.1 * (piece.to - at.0)
 }
 
 /// Where looks say that they saw through: any, where no look covers the wall; otherwise more than

@@ -177,7 +177,7 @@ impl Walls {
             .filter(|other| wall.is_backed_by(other, config))
             .collect();
         let through = seen_through(wall, &wall.seen, &backs, grid, config);
-        let mut pieces = subtract_intervals(&wall.seen, &through);
+        let mut pieces = subtract_intervals(&wall.seen, &through.open);
         for (id, other) in neighbours {
             if other.rank < placed.rank
                 && let Some(segment) = published.get(&id)
@@ -193,8 +193,10 @@ impl Walls {
             .filter(|piece| piece.length() >= least)
             .map(|span| {
                 let end = |at| wall.end_kind(at).unwrap_or(EndKind::Jump);
-                SolidInterval { span, ends: [end(span.from), end(span.to)] }
+                let ends = [end(span.from), end(span.to)];
+                SolidInterval { span, ends, existence: wall.existence(span, &through, config) }
             })
+            .filter(|piece| piece.existence.nat() > config.existence_min)
             .collect();
         (!solid.is_empty()).then(|| Segment {
             line: wall.line,

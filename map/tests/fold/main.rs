@@ -3,6 +3,7 @@
 
 mod chains;
 mod clusters;
+mod existence;
 mod honesty;
 mod set_function;
 mod walls;

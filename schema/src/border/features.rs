@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use mapfold_map::geometry::{Interval, Line, Point};
 use mapfold_map::level::{self, ContributionId, FeatureId, RobotName};
-use mapfold_map::raster::{TILE_CELLS, TILE_SIDE, Tile, TileIndex, TileKey};
+use mapfold_map::raster::{LogOdds, TILE_CELLS, TILE_SIDE, Tile, TileIndex, TileKey};
 use mapfold_map::vector::{Cluster, Segment, SolidInterval};
 use uuid::Uuid;
 
@@ -60,6 +60,7 @@ fn wire_solid(solid: &SolidInterval) -> v1::SolidInterval {
         from_m: solid.span.from_m(),
         to_m: solid.span.to_m(),
         ends: solid.ends.map(Into::into),
+        existence_nat: solid.existence.nat(),
     }
 }
 
@@ -285,7 +286,8 @@ fn read_solids(
         let place = place.index(i);
         let from = millimetres(solid.from_m, &place.field("from_m"), wrong);
         let to = millimetres(solid.to_m, &place.field("to_m"), wrong);
-        let (Some(from), Some(to)) = (from, to) else { continue };
+        let existence = hundredths(solid.existence_nat, &place.field("existence_nat"), wrong);
+        let (Some(from), Some(to), Some(existence)) = (from, to, existence) else { continue };
         if from >= to || read.last().is_some_and(|before| before.span.to > from) {
             wrong.add(
                 &place,
@@ -293,7 +295,8 @@ fn read_solids(
                 "solid parts ascend, apart from each other, from_m before to_m",
             );
         }
-        read.push(SolidInterval { span: Interval { from, to }, ends: solid.ends.map(Into::into) });
+        let ends = solid.ends.map(Into::into);
+        read.push(SolidInterval { span: Interval { from, to }, ends, existence });
     }
     read
 }
@@ -310,6 +313,16 @@ fn millimetres(metres: f64, place: &Place<'_>, wrong: &mut Violations) -> Option
         return None;
     }
     Some(along.from)
+}
+
+fn hundredths(nat: f64, place: &Place<'_>, wrong: &mut Violations) -> Option<LogOdds> {
+    let nat = finite(nat, place, wrong)?;
+    let log_odds = LogOdds::from_nat(nat);
+    if log_odds.nat().to_bits() != nat.to_bits() {
+        wrong.add(place, "not_hundredths", "this must be a whole number of hundredths of a nat");
+        return None;
+    }
+    Some(log_odds)
 }
 
 fn read_cluster(

@@ -44,6 +44,9 @@ pub struct SolidInterval {
     pub to_m: f64,
     /// What the lower and the upper end are.
     pub ends: [EndKind; 2],
+    /// Log-odds that it is there, in whole hundredths of a nat: looks that saw it speak for it,
+    /// looks that saw through it against it.
+    pub existence_nat: f64,
 }
 
 /// A straight piece of wall of the map, in the level frame.

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use mapfold_map::geometry::{Covariance, Interval, Line, Point};
 use mapfold_map::level::{ContributionId, FeatureId, LevelMap};
-use mapfold_map::raster::{SensorClass, TILE_CELLS, Tile, TileIndex, TileKey};
+use mapfold_map::raster::{LogOdds, SensorClass, TILE_CELLS, Tile, TileIndex, TileKey};
 use mapfold_map::vector::{Cluster, EndKind, Facing, Segment, SolidInterval};
 use mapfold_schema::geojson;
 use mapfold_schema::route;
@@ -25,6 +25,7 @@ fn map() -> LevelMap {
     let span = |from, to| SolidInterval {
         span: Interval { from, to },
         ends: [EndKind::Corner, EndKind::Occluded],
+        existence: LogOdds(3468),
     };
     let segment = Segment {
         line: Line::normal_form(2.5, 0.3).0,

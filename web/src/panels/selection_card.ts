@@ -1,12 +1,12 @@
 // What the operator has chosen on the map, in figures.
 
 import { competenceInWords } from "../competence";
-import { angleSd, areaOf, edgesOf, ellipse95, lengthOf, middleOf, offsetSd } from "../geometry";
+import { angleSd, areaOf, edgesOf, ellipse95, leastExistence, lengthOf, middleOf, offsetSd } from "../geometry";
 import { el, setShown, setText } from "../dom";
 import { isSilent, type State } from "../state";
 import type { Store } from "../store";
 import type { Chain, Cluster, EndKind, RobotDescription, Segment } from "../wire";
-import { ago, coordinate, count, counted, degrees, fixed, instant, lengthInWords, listed } from "../words";
+import { ago, coordinate, count, counted, degrees, fixed, instant, lengthInWords, likelihood, listed } from "../words";
 
 /** A card's title and its lines. */
 export interface Description {
@@ -58,6 +58,7 @@ function describeSegment(segment: Segment, state: State): Description {
     title: "Segment",
     lines: [
       ["Quality", counted(segment.quality, "look")],
+      ["Is there", `${likelihood(leastExistence(segment))} or more`],
       ["Seen by", names(segment.robots, state)],
       ["Length", `${lengthInWords(lengthOf(segment))} in ${counted(segment.solid.length, "piece")}`],
       ["Offset sd", `${lengthInWords(sd)}, of it ${lengthInWords(shared)} shared`],

@@ -157,7 +157,7 @@ export function createMockLevel({ nowMs, seed = 1 }) {
         covariance_independent: about(ownVar, angleVar),
         covariance_dependent: about(sharedVar, 0),
         facing: "origin",
-        solid: [{ ...ends, ends: ["corner", quality > 3 ? "jump" : "occluded"] }],
+        solid: [{ ...ends, ends: ["corner", quality > 3 ? "jump" : "occluded"], existence_nat: Math.round(289 * quality) / 100 }],
         quality,
         robots: [...new Set([...(before?.robots ?? []), robot])].sort(),
         first_seen: before?.first_seen ?? at,

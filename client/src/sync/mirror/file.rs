@@ -2,14 +2,14 @@
 //!
 //! ```text
 //! "MFMIRROR"          8 bytes
-//! version             u32, little-endian, 2
+//! version             u32, little-endian, 3
 //! checksum            32 bytes, SHA-256 of all that follows
 //! payload             CBOR of the level, its frame, its revision and the map as a patch from
 //!                     nothing, zstd
 //! ```
 //!
-//! A file of version 1 knows no chains: of it only the level and its frame are taken over, and the
-//! map is fetched anew.
+//! A file of version 1 knows no chains, one of version 2 no existence: of these only the level and
+//! its frame are taken over, and the map is fetched anew.
 
 use std::fs;
 use std::io;
@@ -29,9 +29,7 @@ use crate::sync::durable::{self, DiskError, at};
 
 const FILE: &str = "level.mirror";
 const MAGIC: &[u8; 8] = b"MFMIRROR";
-const VERSION: u32 = 2;
-/// The version before chains.
-const WITHOUT_CHAINS: u32 = 1;
+const VERSION: u32 = 3;
 const ZSTD_LEVEL: i32 = 3;
 
 /// What a file holds.
@@ -40,6 +38,15 @@ pub(super) struct Saved {
     pub(super) level: LevelAddress,
     pub(super) ground: Ground,
     pub(super) known: KnownMap,
+}
+
+/// What files of every version begin with.
+#[derive(Deserialize)]
+struct Head {
+    site: String,
+    level: String,
+    frame: Uuid,
+    resolution_m: f64,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -109,7 +116,7 @@ fn decode(bytes: &[u8]) -> Result<Saved, String> {
     let rest = bytes.strip_prefix(MAGIC).ok_or("it is not the file of a mirror")?;
     let (version, rest) = rest.split_first_chunk().ok_or("it is cut short")?;
     let version = u32::from_le_bytes(*version);
-    if version != VERSION && version != WITHOUT_CHAINS {
+    if !(1..=VERSION).contains(&version) {
         return Err(format!("it is of format version {version}, and this program knows {VERSION}"));
     }
     let (checksum, payload) = rest.split_first_chunk::<32>().ok_or("it is cut short")?;
@@ -117,16 +124,17 @@ fn decode(bytes: &[u8]) -> Result<Saved, String> {
         return Err("its checksum does not fit".to_owned());
     }
     let cbor = zstd::stream::decode_all(payload).map_err(|e| e.to_string())?;
-    let content: Content = codec::from_cbor(&cbor).map_err(|e| e.to_string())?;
-    let patch = map_patch(&content.map).map_err(|violations| format!("{violations:?}"))?;
+    let head: Head = codec::from_cbor(&cbor).map_err(|e| e.to_string())?;
     let mut known = KnownMap::default();
     if version == VERSION {
+        let content: Content = codec::from_cbor(&cbor).map_err(|e| e.to_string())?;
+        let patch = map_patch(&content.map).map_err(|violations| format!("{violations:?}"))?;
         apply(&patch, &mut known.map);
         known.revision = content.map.revision;
     }
     Ok(Saved {
-        level: LevelAddress { site: content.site, level: content.level },
-        ground: Ground { frame: content.frame, resolution_m: content.resolution_m },
+        level: LevelAddress { site: head.site, level: head.level },
+        ground: Ground { frame: head.frame, resolution_m: head.resolution_m },
         known,
     })
 }

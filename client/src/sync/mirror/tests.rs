@@ -253,24 +253,45 @@ async fn a_damaged_file_is_set_aside_and_everything_read_anew() {
     }
 }
 
+/// A file of format `version`, whose map nobody can read any more.
+fn file_of(version: u32) -> Vec<u8> {
+    #[derive(serde::Serialize)]
+    struct Old {
+        site: String,
+        level: String,
+        frame: uuid::Uuid,
+        resolution_m: f64,
+        map: &'static str,
+    }
+    let LevelAddress { site, level } = level();
+    let old = Old { site, level, frame: FRAME, resolution_m: 0.05, map: "as it was" };
+    let cbor = mapfold_schema::codec::to_cbor(&old).unwrap();
+    let payload = zstd::bulk::compress(&cbor, 3).unwrap();
+    let mut bytes = b"MFMIRROR".to_vec();
+    bytes.extend(version.to_le_bytes());
+    bytes.extend(<sha2::Sha256 as sha2::Digest>::digest(&payload));
+    bytes.extend(payload);
+    bytes
+}
+
 #[tokio::test(flavor = "multi_thread")]
-async fn a_file_from_before_chains_is_fetched_anew_without_a_word() {
+async fn a_file_of_an_older_version_is_fetched_anew_without_a_word() {
     let stub = with_contributions(0..9);
     let folder = tempfile::tempdir().unwrap();
     open(&folder).refresh(&api_of(&stub)).await.unwrap();
     let path = folder.path().join("level.mirror");
-    let mut bytes = fs::read(&path).unwrap();
-    bytes[8..12].copy_from_slice(&1_u32.to_le_bytes());
-    fs::write(&path, &bytes).unwrap();
-    let mut mirror = open(&folder);
-    assert_eq!((mirror.revision(), mirror.frame()), (0, Some(FRAME)));
-    let refreshed = mirror.refresh(&api_of(&stub)).await.unwrap();
-    assert_eq!((refreshed.to_revision, refreshed.resync), (9, None));
-    assert_eq!(mirror.map(), stub.ledger().map());
-    bytes[8..12].copy_from_slice(&3_u32.to_le_bytes());
-    drop(mirror);
-    fs::write(&path, &bytes).unwrap();
-    assert_eq!(open(&folder).resync, Some(ResyncReason::DamagedFile));
+    for version in [1, 2] {
+        fs::write(&path, file_of(version)).unwrap();
+        let mut mirror = open(&folder);
+        assert_eq!((mirror.revision(), mirror.frame()), (0, Some(FRAME)));
+        let refreshed = mirror.refresh(&api_of(&stub)).await.unwrap();
+        assert_eq!((refreshed.to_revision, refreshed.resync), (9, None));
+        assert_eq!(mirror.map(), stub.ledger().map());
+    }
+    for version in [0, 3, 4] {
+        fs::write(&path, file_of(version)).unwrap();
+        assert_eq!(open(&folder).resync, Some(ResyncReason::DamagedFile), "version {version}");
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
