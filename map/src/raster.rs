@@ -1,9 +1,11 @@
 //! Occupancy evidence: integer log-odds that add up in any order and can be taken out exactly.
 
+mod blocks;
 mod evidence;
 mod log_odds;
 mod tile;
 
+pub(crate) use blocks::{Blocks, Touched};
 pub use evidence::{EvidencePatch, EvidenceRun, RunError, TilePatch};
 pub use log_odds::LogOdds;
 pub use tile::{Cell, TILE_CELLS, TILE_SIDE, Tile, TileIndex, TileKey};

@@ -7,16 +7,21 @@
 //! ([`Segment`]) -> oriented (`piece`), joined where ends meet
 //! (`joint`, `gap`, `chains`) and cut to valid outlines (`outline`, `crossing`): [`Chain`]. Clusters go
 //! the same way as segments, shorter (`things`), and end where a wall explains them (`explained`).
+//!
+//! What depends on what is found in a few places of memory, however large the level is: by numbered
+//! places (`slots`), by squares of the level (`squares`, `ends`), by blocks of cells (`by_block`).
 
-mod by_tile;
+mod by_block;
 mod chain;
 mod chains;
 mod cluster;
 mod config;
 mod crossing;
+mod ends;
 mod explained;
 mod fusion;
 mod gap;
+mod joinable;
 mod joint;
 mod leaders;
 mod outline;
@@ -24,9 +29,12 @@ mod piece;
 mod seen_through;
 mod segment;
 mod sighting;
+mod slots;
+mod squares;
 mod things;
 mod wall;
 mod walls;
+mod work;
 
 pub use chain::{Chain, ChainId, ChainKind, Vertex};
 pub(crate) use chains::Chains;
@@ -36,3 +44,4 @@ pub(crate) use seen_through::Evidence;
 pub use segment::{EndKind, Facing, ObservedEnd, ObservedSegment, Segment, SolidInterval};
 pub(crate) use things::Things;
 pub(crate) use walls::Walls;
+pub use work::Work;

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::{Batch, Contribution, ContributionId, FeatureId, LevelMap, Misplaced};
-use crate::raster::{SensorClass, Tile, TileIndex, TileKey, TilePatch};
-use crate::vector::{ChainId, Chains, Evidence, Things, VectorConfig, Walls};
+use crate::raster::{Blocks, SensorClass, Tile, TileKey, TilePatch, Touched};
+use crate::vector::{ChainId, Chains, Evidence, Things, VectorConfig, Walls, Work};
 
 /// What a level's fold depends on besides its contributions.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,7 +92,7 @@ impl Level {
             .collect();
         let mut inserted: Vec<&Contribution> = contributions.into_iter().collect();
         inserted.retain(|c| level.in_force.insert(c.id));
-        level.fold_features(&inserted, &[], Changes::default());
+        level.fold_features(&inserted, &[], &BTreeMap::new());
         level
     }
 
@@ -111,6 +111,11 @@ impl Level {
         &self.in_force
     }
 
+    /// How much has been done to get here, by all folds and unfolds.
+    pub fn work(&self) -> Work {
+        self.walls.work() + self.things.work() + self.chains.work()
+    }
+
     /// Folds contributions in. One that is in force already changes nothing.
     pub fn fold<'a>(
         &mut self,
@@ -119,7 +124,7 @@ impl Level {
         let mut inserted: Vec<&Contribution> = contributions.into_iter().collect();
         inserted.retain(|c| self.in_force.insert(c.id));
         let tiles = self.fold_evidence(&inserted, Tile::add);
-        self.fold_features(&inserted, &[], Changes { tiles, ..Changes::default() })
+        self.fold_features(&inserted, &[], &tiles)
     }
 
     /// Takes contributions out again: the map is then bit for bit what it would have been without
@@ -132,7 +137,7 @@ impl Level {
         let mut removed: Vec<&Contribution> = contributions.into_iter().collect();
         removed.retain(|c| self.in_force.remove(&c.id));
         let tiles = self.fold_evidence(&removed, Tile::subtract);
-        self.fold_features(&[], &removed, Changes { tiles, ..Changes::default() })
+        self.fold_features(&[], &removed, &tiles)
     }
 
     /// Folds a batch in, at once: the same bits as [`Self::fold`] with its contributions.
@@ -146,7 +151,7 @@ impl Level {
         self.in_force.extend(batch.contributions.keys());
         let tiles = self.fold_sums(batch, Tile::add_tile);
         let inserted: Vec<&Contribution> = batch.contributions.values().collect();
-        Ok(self.fold_features(&inserted, &[], Changes { tiles, ..Changes::default() }))
+        Ok(self.fold_features(&inserted, &[], &tiles))
     }
 
     /// Takes a batch out, at once: the same bits as [`Self::unfold`] with its contributions.
@@ -162,32 +167,37 @@ impl Level {
         }
         let tiles = self.fold_sums(batch, Tile::subtract_tile);
         let removed: Vec<&Contribution> = batch.contributions.values().collect();
-        Ok(self.fold_features(&[], &removed, Changes { tiles, ..Changes::default() }))
+        Ok(self.fold_features(&[], &removed, &tiles))
     }
 
-    /// Applies the summed evidence of a batch by `change`; returns the touched tiles.
-    fn fold_sums(&mut self, batch: &Batch, change: fn(&mut Tile, &Tile)) -> BTreeSet<TileKey> {
+    /// Applies the summed evidence of a batch by `change`; returns what is touched.
+    fn fold_sums(
+        &mut self,
+        batch: &Batch,
+        change: fn(&mut Tile, &Tile),
+    ) -> BTreeMap<TileKey, Blocks> {
         for (key, sums) in &batch.evidence {
             change(Arc::make_mut(self.map.tiles.entry(*key).or_default()), sums);
         }
-        let touched = batch.evidence.keys().copied().collect();
+        let blocks = |(key, sums): (&TileKey, &Tile)| (*key, Blocks::of_tile(sums));
+        let touched = batch.evidence.iter().map(blocks).collect();
         self.drop_empty(&touched);
         touched
     }
 
-    /// Applies the evidence of `contributions` by `change`; returns the touched tiles.
+    /// Applies the evidence of `contributions` by `change`; returns what is touched.
     fn fold_evidence(
         &mut self,
         contributions: &[&Contribution],
         change: fn(&mut Tile, &TilePatch),
-    ) -> BTreeSet<TileKey> {
-        let mut touched = BTreeSet::new();
+    ) -> BTreeMap<TileKey, Blocks> {
+        let mut touched: BTreeMap<TileKey, Blocks> = BTreeMap::new();
         for patch in contributions.iter().flat_map(|c| &c.evidence) {
             for (tile, cells) in &patch.tiles {
                 let key = TileKey { class: patch.class, tile: *tile };
                 let sum = self.map.tiles.entry(key).or_default();
                 change(Arc::make_mut(sum), cells);
-                touched.insert(key);
+                touched.entry(key).or_default().add(Blocks::of_patch(cells));
             }
         }
         self.drop_empty(&touched);
@@ -195,8 +205,8 @@ impl Level {
     }
 
     /// A tile without evidence is the same as none.
-    fn drop_empty(&mut self, touched: &BTreeSet<TileKey>) {
-        for key in touched {
+    fn drop_empty(&mut self, touched: &BTreeMap<TileKey, Blocks>) {
+        for key in touched.keys() {
             if self.map.tiles.get(key).is_some_and(|tile| tile.is_empty()) {
                 self.map.tiles.remove(key);
             }
@@ -207,25 +217,25 @@ impl Level {
         &mut self,
         inserted: &[&Contribution],
         removed: &[&Contribution],
-        mut changes: Changes,
+        touched: &BTreeMap<TileKey, Blocks>,
     ) -> Changes {
-        let touched: BTreeSet<TileIndex> = changes
-            .tiles
+        let mut changes =
+            Changes { tiles: touched.keys().copied().collect(), ..Changes::default() };
+        let touched: Touched = touched
             .iter()
-            .filter(|key| key.class == SensorClass::Scanner)
-            .map(|key| key.tile)
+            .filter(|(key, _)| key.class == SensorClass::Scanner)
+            .map(|(key, blocks)| (key.tile, *blocks))
             .collect();
         let LevelMap { segments, clusters, chains, tiles } = &mut self.map;
         let grid = Grid { tiles, resolution: self.config.resolution };
         let config = &self.config.vector;
-        changes.segments = self.walls.update(inserted, removed, &touched, &grid, segments, config);
-        let walls = &self.walls;
+        let walls = self.walls.update(inserted, removed, &touched, &grid, segments, config);
+        changes.segments = walls.iter().map(|wall| wall.id).collect();
         let changed = &changes.segments;
         changes.clusters = self
             .things
             .update(inserted, removed, &touched, changed, segments, &grid, clusters, config);
-        changes.chains =
-            self.chains.update(changed, &touched, walls, segments, &grid, chains, config);
+        changes.chains = self.chains.update(&walls, &touched, &self.walls, &grid, chains, config);
         changes
     }
 }

@@ -9,73 +9,42 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::by_tile::ByTile;
+use super::by_block::ByBlock;
 use super::chain::{Chain, ChainId};
+use super::ends::Ends;
 use super::gap::Gap;
+use super::joinable::{Joinable, Joined, Possible};
 use super::joint::Joint;
-use super::leaders::Rank;
+use super::leaders::Member;
 use super::outline::{self, Link};
-use super::piece::{Piece, PieceKey};
+use super::piece::{PieceAt, PieceKey};
 use super::seen_through::Evidence;
+use super::slots::Slots;
 use super::walls::Walls;
-use super::{Segment, VectorConfig};
-use crate::geometry::Point;
-use crate::level::FeatureId;
-use crate::raster::TileIndex;
-
-/// The pieces of a published segment.
-#[derive(Debug, Clone)]
-pub(super) struct Published {
-    pub(super) pieces: Vec<Piece>,
-    /// Of the founding observation.
-    pub(super) rank: Rank,
-    /// The piece nearest to the middle of the founding observation.
-    founding: u16,
-}
-
-impl Published {
-    /// The identity of a chain that is called after one of these pieces.
-    pub(super) fn chain_id(&self, key: PieceKey) -> ChainId {
-        let piece = i32::from(key.part) - i32::from(self.founding);
-        ChainId { segment: key.segment, piece: piece.clamp(-32_768, 32_767) as i16 }
-    }
-}
+use super::{VectorConfig, Work};
+use crate::raster::Touched;
 
 /// A joint from the head of one piece to the tail of another.
-type JointKey = (PieceKey, PieceKey);
-
-/// A joint that could be made.
-#[derive(Debug, Clone)]
-struct Possible {
-    joint: Joint,
-    gap: Gap,
-    tiles: Vec<TileIndex>,
-    is_seen_through: bool,
-}
+type JointAt = (PieceAt, PieceAt);
 
 /// The state of the chains.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Chains {
-    published: BTreeMap<FeatureId, Published>,
-    heads: EndIndex,
-    tails: EndIndex,
-    possible: BTreeMap<JointKey, Possible>,
-    /// The same joints, tail first.
-    by_tail: BTreeSet<(PieceKey, PieceKey)>,
-    by_tile: ByTile<JointKey>,
-    /// The joints that are made, by the piece that they leave and by the one that they reach.
-    next: BTreeMap<PieceKey, PieceKey>,
-    previous: BTreeMap<PieceKey, PieceKey>,
-    chain_of: BTreeMap<PieceKey, ChainId>,
+    /// In the places of the segments' walls.
+    joinable: Slots<Box<Joinable>>,
+    heads: Ends,
+    tails: Ends,
+    by_block: ByBlock<JointAt>,
+    work: Work,
 }
 
 /// What an update has to look at again.
 #[derive(Default)]
 struct Unsettled {
     /// Pieces that a joint could leave or reach otherwise than before.
-    pieces: BTreeSet<PieceKey>,
+    pieces: BTreeSet<PieceAt>,
     /// Pieces whose chains have to be formed anew.
-    chains: BTreeSet<PieceKey>,
+    chains: BTreeSet<PieceAt>,
     /// Chains that may be no more.
     gone: BTreeSet<ChainId>,
 }
@@ -83,175 +52,204 @@ struct Unsettled {
 impl Chains {
     /// Follows what [`Walls::update`] changed. Published chains are brought up to date in
     /// `published`; returns those that are new, different or gone.
-    #[expect(clippy::too_many_arguments, reason = "the map's layers and what changed in them")]
     pub(crate) fn update<E: Evidence>(
         &mut self,
-        changed: &BTreeSet<FeatureId>,
-        touched: &BTreeSet<TileIndex>,
+        changed: &BTreeSet<Member>,
+        touched: &Touched,
         walls: &Walls,
-        segments: &BTreeMap<FeatureId, Arc<Segment>>,
         grid: &E,
         published: &mut BTreeMap<ChainId, Arc<Chain>>,
         config: &VectorConfig,
     ) -> BTreeSet<ChainId> {
         let mut unsettled = Unsettled::default();
-        for id in changed {
-            self.take_out(*id, &mut unsettled);
+        for member in changed {
+            self.take_out(*member, &mut unsettled);
         }
-        for id in changed {
-            if let (Some(segment), Some((rank, middle))) = (segments.get(id), walls.founder(*id)) {
-                self.put_in(*id, segment, rank, &middle, config);
+        for member in changed {
+            if let Some((segment, rank, middle)) = walls.published(*member) {
+                self.put_in(*member, Joinable::new(segment, rank, &middle, config));
             }
         }
-        for id in changed {
-            self.find_joints(*id, grid, config, &mut unsettled);
+        for member in changed {
+            self.find_joints(*member, grid, config, &mut unsettled);
         }
         self.look_again(touched, grid, config, &mut unsettled);
         self.settle(&mut unsettled);
         self.form(unsettled, published, config)
     }
 
+    /// What this has done so far.
+    pub(crate) fn work(&self) -> Work {
+        self.work
+    }
+
     /// Forgets a segment's pieces, their joints, and the chains through them.
-    fn take_out(&mut self, id: FeatureId, unsettled: &mut Unsettled) {
-        let Some(old) = self.published.remove(&id) else { return };
-        for (part, piece) in (0_u16..).zip(&old.pieces) {
-            let key = PieceKey { segment: id, part };
-            self.heads.remove(key, &piece.head.at);
-            self.tails.remove(key, &piece.tail.at);
-            for joint in self.joints_of(key) {
-                self.forget(joint);
-                let other = if joint.0 == key { joint.1 } else { joint.0 };
-                unsettled.pieces.insert(other);
+    fn take_out(&mut self, member: Member, unsettled: &mut Unsettled) {
+        let slot = member.slot;
+        if self.joinable.get(slot).is_none_or(|old| old.rank.id != member.id) {
+            return;
+        }
+        let Some(old) = self.joinable.take(slot) else { return };
+        for (part, joined) in (0_u16..).zip(old.pieces) {
+            let own = PieceAt { slot, part };
+            self.heads.remove(own, joined.piece.head.at);
+            self.tails.remove(own, joined.piece.tail.at);
+            for possible in joined.possible {
+                self.by_block.remove((own, possible.to), &possible.depends_on);
+                if let Some(other) = self.joined_mut(possible.to) {
+                    other.before.retain(|piece| *piece != own);
+                    unsettled.pieces.insert(possible.to);
+                }
             }
-            if let Some(next) = self.next.remove(&key) {
-                self.previous.remove(&next);
+            for before in joined.before {
+                let Some(other) = self.joined_mut(before) else { continue };
+                let at = other.possible.iter().position(|possible| possible.to == own);
+                if let Some(possible) = at.map(|at| other.possible.swap_remove(at)) {
+                    self.by_block.remove((before, own), &possible.depends_on);
+                    unsettled.pieces.insert(before);
+                }
+            }
+            if let Some(next) = joined.next
+                && let Some(other) = self.joined_mut(next)
+            {
+                other.previous = None;
                 unsettled.chains.insert(next);
             }
-            if let Some(previous) = self.previous.remove(&key) {
-                self.next.remove(&previous);
+            if let Some(previous) = joined.previous
+                && let Some(other) = self.joined_mut(previous)
+            {
+                other.next = None;
                 unsettled.chains.insert(previous);
             }
-            unsettled.gone.extend(self.chain_of.remove(&key));
-            // It may come back under the same name and be joined or not.
-            unsettled.pieces.remove(&key);
-            unsettled.chains.remove(&key);
+            unsettled.gone.extend(joined.chain);
         }
     }
 
-    fn put_in(
-        &mut self,
-        id: FeatureId,
-        segment: &Arc<Segment>,
-        rank: Rank,
-        middle: &Point,
-        config: &VectorConfig,
-    ) {
-        let pieces: Vec<Piece> = Piece::of(segment, config).take(usize::from(u16::MAX)).collect();
-        let at = (segment.line.along(middle) * 1e3).round() as i64;
-        let away = |part: &u16| {
-            let span = segment.solid[usize::from(*part)].span;
-            (span.from - at).max(at - span.to).max(0)
-        };
-        let founding = (0..pieces.len() as u16).min_by_key(away).unwrap_or(0);
-        for (part, piece) in (0_u16..).zip(&pieces) {
-            let key = PieceKey { segment: id, part };
-            self.heads.insert(key, &piece.head.at);
-            self.tails.insert(key, &piece.tail.at);
+    fn put_in(&mut self, member: Member, joinable: Joinable) {
+        let slot = member.slot;
+        for (part, joined) in (0_u16..).zip(&joinable.pieces) {
+            self.heads.insert(PieceAt { slot, part }, joined.piece.head.at);
+            self.tails.insert(PieceAt { slot, part }, joined.piece.tail.at);
         }
-        self.published.insert(id, Published { pieces, rank, founding });
+        self.joinable.put(slot, Box::new(joinable));
     }
 
     /// Finds all joints that could be made with a segment's pieces.
     fn find_joints<E: Evidence>(
         &mut self,
-        id: FeatureId,
+        member: Member,
         grid: &E,
         config: &VectorConfig,
         unsettled: &mut Unsettled,
     ) {
-        let Some(segment) = self.published.get(&id) else { return };
+        let slot = member.slot;
+        let Some(segment) = self.joinable.get(slot) else { return };
         let mut found = Vec::new();
-        for (part, piece) in (0_u16..).zip(&segment.pieces) {
-            let key = PieceKey { segment: id, part };
-            unsettled.pieces.insert(key);
-            unsettled.chains.insert(key);
-            let reach = (2.0 * config.joint_max).max(config.gap_max + config.duplicate_offset);
-            found.extend(self.tails.near(&piece.head.at, reach).map(|other| (key, other)));
-            found.extend(self.heads.near(&piece.tail.at, reach).map(|other| (other, key)));
+        let reach = (2.0 * config.joint_max).max(config.gap_max + config.duplicate_offset);
+        for (part, joined) in (0_u16..).zip(&segment.pieces) {
+            let own = PieceAt { slot, part };
+            unsettled.pieces.insert(own);
+            unsettled.chains.insert(own);
+            found.extend(self.tails.near(joined.piece.head.at, reach).map(|other| (own, other)));
+            found.extend(self.heads.near(joined.piece.tail.at, reach).map(|other| (other, own)));
         }
-        for key in found {
-            if key.0 == key.1 || self.possible.contains_key(&key) {
+        self.work.joints += found.len() as u64;
+        for (from, to) in found {
+            let Some((a, b)) = self.joined(from).zip(self.joined(to)) else { continue };
+            if from == to || b.before.contains(&from) {
                 continue;
             }
-            let Some((a, b)) = self.piece(key.0).zip(self.piece(key.1)) else { continue };
-            let Some(joint) = Joint::new(a, b, config) else { continue };
-            let gap = Gap::new(a, b, &joint.vertex.at, config);
-            let tiles = gap.tiles(grid.resolution());
+            let Some(joint) = Joint::new(&a.piece, &b.piece, config) else { continue };
+            let gap = Gap::new(&a.piece, &b.piece, &joint.vertex.at, config);
+            self.work.gaps_against_grid += 1;
+            let depends_on = gap.blocks(grid.resolution());
             let is_seen_through = gap.is_seen_through(grid, config);
-            unsettled.pieces.extend([key.0, key.1]);
-            self.by_tile.insert(key, &tiles);
-            self.by_tail.insert((key.1, key.0));
-            self.possible.insert(key, Possible { joint, gap, tiles, is_seen_through });
+            unsettled.pieces.extend([from, to]);
+            self.by_block.insert((from, to), &depends_on);
+            if let Some(a) = self.joined_mut(from) {
+                a.possible.push(Possible { to, joint, gap, depends_on, is_seen_through });
+            }
+            if let Some(b) = self.joined_mut(to) {
+                b.before.push(from);
+            }
         }
     }
 
-    /// Looks again through the gaps in tiles whose evidence has changed.
+    /// Looks again through the gaps whose evidence has changed.
     fn look_again<E: Evidence>(
         &mut self,
-        touched: &BTreeSet<TileIndex>,
+        touched: &Touched,
         grid: &E,
         config: &VectorConfig,
         unsettled: &mut Unsettled,
     ) {
-        let keys: BTreeSet<JointKey> =
-            touched.iter().flat_map(|tile| self.by_tile.of(*tile)).collect();
-        for key in keys {
-            let Some(possible) = self.possible.get_mut(&key) else { continue };
-            let is_seen_through = possible.gap.is_seen_through(grid, config);
-            if is_seen_through != possible.is_seen_through {
-                possible.is_seen_through = is_seen_through;
-                unsettled.pieces.extend([key.0, key.1]);
+        let joints: BTreeSet<JointAt> = self.by_block.touched(touched).collect();
+        self.work.gaps_against_grid += joints.len() as u64;
+        for (from, to) in joints {
+            let Some(joined) = self.joined_mut(from) else { continue };
+            for possible in joined.possible.iter_mut().filter(|possible| possible.to == to) {
+                let is_seen_through = possible.gap.is_seen_through(grid, config);
+                if is_seen_through != possible.is_seen_through {
+                    possible.is_seen_through = is_seen_through;
+                    unsettled.pieces.extend([from, to]);
+                }
             }
         }
     }
 
     /// Makes the joints anew in every component that holds an unsettled piece's end.
     fn settle(&mut self, unsettled: &mut Unsettled) {
-        let mut done: BTreeSet<JointKey> = BTreeSet::new();
-        let mut component: Vec<JointKey> =
-            unsettled.pieces.iter().flat_map(|key| self.joints_of(*key)).collect();
+        let mut component: Vec<JointAt> = unsettled
+            .pieces
+            .iter()
+            .flat_map(|at| self.joints_from(*at).chain(self.joints_to(*at)))
+            .collect();
+        let mut done: BTreeSet<JointAt> = BTreeSet::new();
         let mut at = 0;
-        while let Some(key) = component.get(at).copied() {
+        while let Some(joint) = component.get(at).copied() {
             at += 1;
-            if done.insert(key) {
-                component.extend(self.joints_from(key.0));
-                component.extend(self.joints_to(key.1));
+            if done.insert(joint) {
+                component.extend(self.joints_from(joint.0));
+                component.extend(self.joints_to(joint.1));
             }
         }
-        let before: BTreeSet<JointKey> =
-            done.iter().copied().filter(|key| self.next.get(&key.0) == Some(&key.1)).collect();
-        let mut best_first: Vec<(f64, JointKey)> = done
+        let mut best_first: Vec<(f64, [PieceKey; 2], JointAt)> = done
             .iter()
-            .filter_map(|key| {
-                let possible = self.possible.get(key)?;
-                (!possible.is_seen_through).then_some((possible.joint.cost, *key))
+            .filter_map(|joint| {
+                let possible = self.possible(*joint).filter(|p| !p.is_seen_through)?;
+                let keys = [self.key(joint.0)?, self.key(joint.1)?];
+                Some((possible.joint.cost, keys, *joint))
             })
             .collect();
         best_first.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        for key in &before {
-            self.next.remove(&key.0);
-            self.previous.remove(&key.1);
-        }
-        let mut after: BTreeSet<JointKey> = BTreeSet::new();
-        for (_, key) in best_first {
-            if !self.next.contains_key(&key.0) && !self.previous.contains_key(&key.1) {
-                self.next.insert(key.0, key.1);
-                self.previous.insert(key.1, key.0);
-                after.insert(key);
+        let mut before: BTreeSet<JointAt> = BTreeSet::new();
+        for (from, to) in done {
+            if self.joined(from).is_some_and(|joined| joined.next == Some(to)) {
+                before.insert((from, to));
+                self.join((from, to), false);
             }
         }
-        for key in before.symmetric_difference(&after) {
-            unsettled.chains.extend([key.0, key.1]);
+        let mut after: BTreeSet<JointAt> = BTreeSet::new();
+        for (_, _, (from, to)) in best_first {
+            let is_free = self.joined(from).is_some_and(|joined| joined.next.is_none())
+                && self.joined(to).is_some_and(|joined| joined.previous.is_none());
+            if is_free {
+                self.join((from, to), true);
+                after.insert((from, to));
+            }
+        }
+        for joint in before.symmetric_difference(&after) {
+            unsettled.chains.extend([joint.0, joint.1]);
+        }
+    }
+
+    /// Makes a joint or opens it.
+    fn join(&mut self, (from, to): JointAt, is_joined: bool) {
+        if let Some(joined) = self.joined_mut(from) {
+            joined.next = is_joined.then_some(to);
+        }
+        if let Some(joined) = self.joined_mut(to) {
+            joined.previous = is_joined.then_some(from);
         }
     }
 
@@ -264,20 +262,23 @@ impl Chains {
     ) -> BTreeSet<ChainId> {
         let Unsettled { chains, mut gone, .. } = unsettled;
         let mut formed: BTreeMap<ChainId, Chain> = BTreeMap::new();
-        let mut seen: BTreeSet<PieceKey> = BTreeSet::new();
-        for key in chains {
-            if seen.contains(&key) || self.piece(key).is_none() {
+        let mut seen: BTreeSet<PieceAt> = BTreeSet::new();
+        for at in chains {
+            if seen.contains(&at) || self.joined(at).is_none() {
                 continue;
             }
-            let (links, is_closed) = self.links_through(key);
+            let (links, is_closed) = self.links_through(at);
+            self.work.chain_pieces += links.len() as u64;
             for link in &links {
-                seen.insert(link.key);
-                gone.extend(self.chain_of.remove(&link.key));
+                seen.insert(link.at);
+                gone.extend(self.joined_mut(link.at).and_then(|joined| joined.chain.take()));
             }
             for part in outline::simple_parts(links, is_closed, config) {
-                let (id, chain) = part.chain(&self.published);
+                let (id, chain) = part.chain(&self.joinable);
                 for link in &part.links {
-                    self.chain_of.insert(link.key, id);
+                    if let Some(joined) = self.joined_mut(link.at) {
+                        joined.chain = Some(id);
+                    }
                 }
                 formed.insert(id, chain);
             }
@@ -298,92 +299,54 @@ impl Chains {
     }
 
     /// The pieces that are joined with one, in order, each with the joint that leaves it, and
-    /// whether they come full circle.
-    fn links_through(&self, key: PieceKey) -> (Vec<Link>, bool) {
-        let mut first = key;
-        while let Some(previous) = self.previous.get(&first) {
-            first = *previous;
-            if first == key {
+    /// whether they come full circle. A circle begins with its least piece.
+    fn links_through(&self, at: PieceAt) -> (Vec<Link>, bool) {
+        let mut first = at;
+        while let Some(previous) = self.joined(first).and_then(|joined| joined.previous) {
+            first = previous;
+            if first == at {
                 break;
             }
         }
         let mut links = Vec::new();
-        let (mut at, mut is_closed) = (Some(first), false);
-        while let Some(key) = at {
-            let Some(piece) = self.piece(key) else { break };
-            let next = self.next.get(&key).copied();
-            let joint = next.and_then(|next| Some(self.possible.get(&(key, next))?.joint));
-            links.push(Link { key, piece: piece.clone(), joint });
-            is_closed = next == Some(first);
-            at = next.filter(|_| !is_closed);
+        let (mut next, mut is_closed) = (Some(first), false);
+        while let Some(at) = next {
+            let Some((joined, key)) = self.joined(at).zip(self.key(at)) else { break };
+            let joint = joined.next.and_then(|next| Some(self.possible((at, next))?.joint));
+            links.push(Link { key, at, piece: joined.piece.clone(), joint });
+            is_closed = joined.next == Some(first);
+            next = joined.next.filter(|_| !is_closed);
+        }
+        let least = (0..links.len()).min_by_key(|link| links[*link].key);
+        if let Some(least) = least.filter(|_| is_closed) {
+            links.rotate_left(least);
         }
         (links, is_closed)
     }
 
-    fn piece(&self, key: PieceKey) -> Option<&Piece> {
-        self.published.get(&key.segment)?.pieces.get(usize::from(key.part))
+    fn joined(&self, at: PieceAt) -> Option<&Joined> {
+        self.joinable.get(at.slot)?.pieces.get(usize::from(at.part))
     }
 
-    fn forget(&mut self, key: JointKey) {
-        if let Some(old) = self.possible.remove(&key) {
-            self.by_tile.remove(key, &old.tiles);
-            self.by_tail.remove(&(key.1, key.0));
-        }
+    fn joined_mut(&mut self, at: PieceAt) -> Option<&mut Joined> {
+        self.joinable.get_mut(at.slot)?.pieces.get_mut(usize::from(at.part))
     }
 
-    /// All joints that could be made with a piece.
-    fn joints_of(&self, key: PieceKey) -> Vec<JointKey> {
-        self.joints_from(key).chain(self.joints_to(key)).collect()
+    fn key(&self, at: PieceAt) -> Option<PieceKey> {
+        Some(self.joinable.get(at.slot)?.key(at.part))
     }
 
-    fn joints_from(&self, head: PieceKey) -> impl Iterator<Item = JointKey> + '_ {
-        let others = (head, PieceKey::FIRST)..=(head, PieceKey::LAST);
-        self.possible.range(others).map(|(key, _)| *key)
+    fn possible(&self, (from, to): JointAt) -> Option<&Possible> {
+        self.joined(from)?.possible.iter().find(|possible| possible.to == to)
     }
 
-    fn joints_to(&self, tail: PieceKey) -> impl Iterator<Item = JointKey> + '_ {
-        let others = (tail, PieceKey::FIRST)..=(tail, PieceKey::LAST);
-        self.by_tail.range(others).map(|(tail, head)| (*head, *tail))
-    }
-}
-
-/// Edge of a square of the index of ends, metres.
-const SQUARE_SIDE: f64 = 1.0;
-
-/// Ends of pieces by the square that they lie in.
-#[derive(Debug, Clone, Default)]
-struct EndIndex {
-    squares: BTreeMap<(i32, i32), BTreeSet<PieceKey>>,
-}
-
-impl EndIndex {
-    fn square(v: f64) -> i32 {
-        (v / SQUARE_SIDE).floor() as i32
+    fn joints_from(&self, at: PieceAt) -> impl Iterator<Item = JointAt> + '_ {
+        let possible = self.joined(at).into_iter().flat_map(|joined| &joined.possible);
+        possible.map(move |possible| (at, possible.to))
     }
 
-    fn insert(&mut self, key: PieceKey, at: &Point) {
-        let square = (Self::square(at.x), Self::square(at.y));
-        self.squares.entry(square).or_default().insert(key);
-    }
-
-    fn remove(&mut self, key: PieceKey, at: &Point) {
-        let square = (Self::square(at.x), Self::square(at.y));
-        if let Some(keys) = self.squares.get_mut(&square) {
-            keys.remove(&key);
-            if keys.is_empty() {
-                self.squares.remove(&square);
-            }
-        }
-    }
-
-    /// All in the squares that `reach` metres around `at` touch.
-    fn near(&self, at: &Point, reach: f64) -> impl Iterator<Item = PieceKey> + '_ {
-        let (x0, x1) = (Self::square(at.x - reach), Self::square(at.x + reach));
-        let (y0, y1) = (Self::square(at.y - reach), Self::square(at.y + reach));
-        (x0..=x1)
-            .flat_map(move |x| (y0..=y1).map(move |y| (x, y)))
-            .filter_map(|square| self.squares.get(&square))
-            .flatten()
-            .copied()
+    fn joints_to(&self, at: PieceAt) -> impl Iterator<Item = JointAt> + '_ {
+        let before = self.joined(at).into_iter().flat_map(|joined| &joined.before);
+        before.map(move |before| (*before, at))
     }
 }

@@ -4,20 +4,17 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::leaders::SquareIndex;
 use super::piece::offset_variance;
+use super::squares::{Extent, Squares};
 use super::{Cluster, Segment, VectorConfig};
 use crate::geometry::{Covariance, Point, unit_normal};
 use crate::level::FeatureId;
 
-/// A rectangle by its lower left and upper right corner.
-type Extent = (Point, Point);
-
 /// Where clusters and published segments are.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Explained {
-    clusters: SquareIndex,
-    segments: SquareIndex,
+    clusters: Squares<FeatureId>,
+    segments: Squares<FeatureId>,
     /// Of the segments in the index.
     extents: BTreeMap<FeatureId, Extent>,
 }
@@ -59,8 +56,8 @@ impl Explained {
         segments: &BTreeMap<FeatureId, Arc<Segment>>,
         config: &VectorConfig,
     ) -> bool {
-        let near = self.segments.near(cluster_extent(cluster));
-        near.iter().filter_map(|id| segments.get(id)).any(|s| explains(s, cluster, config))
+        let mut near = self.segments.near(cluster_extent(cluster));
+        near.any(|id| segments.get(&id).is_some_and(|s| explains(s, cluster, config)))
     }
 }
 

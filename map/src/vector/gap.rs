@@ -2,9 +2,9 @@
 
 use super::VectorConfig;
 use super::piece::Piece;
-use super::seen_through::Evidence;
+use super::seen_through::{Evidence, Reader};
 use crate::geometry::Point;
-use crate::raster::{Cell, LogOdds, SensorClass, TileIndex, TileKey};
+use crate::raster::{Blocks, LogOdds, TileIndex};
 
 /// What lies between two ends and their vertex, where neither wall was seen: straight stretches,
 /// only those that are long enough to be looked through.
@@ -37,33 +37,24 @@ impl Gap {
     pub(super) fn is_seen_through<E: Evidence>(&self, grid: &E, config: &VectorConfig) -> bool {
         let free_below = LogOdds::from_nat(config.free_below).0;
         let resolution = grid.resolution();
+        let mut reader = Reader::new(grid);
         self.stretches.iter().any(|(from, to)| {
             let (mut open, step) = (0.0, 0.5 * resolution);
             samples(from, to, step).any(|p| {
-                let free = beside(from, to, &p, resolution).iter().all(|q| {
-                    let (tile, offset) = Cell::holding(q, resolution).tile();
-                    let key = TileKey { class: SensorClass::Scanner, tile };
-                    grid.tile(key).is_some_and(|tile| tile.cells()[offset] < free_below)
-                });
+                let beside = beside(from, to, &p, resolution);
+                let free = beside.iter().all(|q| reader.value(q) < free_below);
                 open = if free { open + step } else { 0.0 };
                 open >= config.seen_through_min
             })
         })
     }
 
-    /// The tiles whose evidence it depends on.
-    pub(super) fn tiles(&self, resolution: f64) -> Vec<TileIndex> {
-        let mut tiles: Vec<TileIndex> = self
-            .stretches
-            .iter()
-            .flat_map(|(from, to)| {
-                samples(from, to, 0.5 * resolution).flat_map(|p| beside(from, to, &p, resolution))
-            })
-            .map(|p| Cell::holding(&p, resolution).tile().0)
-            .collect();
-        tiles.sort_unstable();
-        tiles.dedup();
-        tiles
+    /// The blocks of cells whose evidence it depends on.
+    pub(super) fn blocks(&self, resolution: f64) -> Vec<(TileIndex, Blocks)> {
+        let places = self.stretches.iter().flat_map(|(from, to)| {
+            samples(from, to, 0.5 * resolution).flat_map(|p| beside(from, to, &p, resolution))
+        });
+        Blocks::under(places, resolution)
     }
 }
 

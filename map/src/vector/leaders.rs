@@ -12,7 +12,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::geometry::Point;
+use super::slots::{Slot, Slots};
+use super::squares::{Extent, Squares};
 use crate::level::FeatureId;
 
 /// An observation that can be grouped.
@@ -20,10 +21,11 @@ pub(super) trait Groupable {
     /// What pairing depends on besides the two observations.
     type Config;
     /// Lower left and upper right corner of what it can pair with.
-    fn reach(&self) -> (Point, Point);
+    fn reach(&self) -> Extent;
     /// Higher merit leads. Not NaN.
     fn merit(&self) -> f64;
-    /// The cost of `follower` following `self`, lower is better; `None` if they do not pair.
+    /// The cost of `follower` following `self`, lower is better; `None` if they do not pair. Only
+    /// what overlaps in reach pairs.
     fn pairing(&self, follower: &Self, config: &Self::Config) -> Option<f64>;
 }
 
@@ -43,79 +45,51 @@ impl Rank {
     }
 }
 
+/// An observation and the place where it is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Member {
+    pub(crate) id: FeatureId,
+    pub(super) slot: Slot,
+}
+
 #[derive(Debug, Clone)]
 struct Entry<T> {
     item: T,
     rank: Rank,
     /// The leader it follows; itself if it leads; `None` while that is not settled.
-    leader: Option<FeatureId>,
-}
-
-/// Edge of a square of the spatial index, metres.
-const INDEX_SIDE: f64 = 4.0;
-
-/// A spatial index of identities by the squares that they reach into.
-#[derive(Debug, Clone, Default)]
-pub(super) struct SquareIndex {
-    squares: BTreeMap<(i32, i32), Vec<FeatureId>>,
-}
-
-impl SquareIndex {
-    fn squares((low, high): (Point, Point)) -> impl Iterator<Item = (i32, i32)> {
-        let square = |v: f64| (v / INDEX_SIDE).floor() as i32;
-        let (x0, x1, y0, y1) = (square(low.x), square(high.x), square(low.y), square(high.y));
-        (x0..=x1).flat_map(move |x| (y0..=y1).map(move |y| (x, y)))
-    }
-
-    pub(super) fn insert(&mut self, id: FeatureId, reach: (Point, Point)) {
-        for square in Self::squares(reach) {
-            self.squares.entry(square).or_default().push(id);
-        }
-    }
-
-    pub(super) fn remove(&mut self, id: FeatureId, reach: (Point, Point)) {
-        for square in Self::squares(reach) {
-            if let Some(ids) = self.squares.get_mut(&square) {
-                ids.retain(|other| *other != id);
-                if ids.is_empty() {
-                    self.squares.remove(&square);
-                }
-            }
-        }
-    }
-
-    /// All that reach into the same squares, ascending, each once.
-    pub(super) fn near(&self, reach: (Point, Point)) -> Vec<FeatureId> {
-        let mut ids: Vec<FeatureId> = Self::squares(reach)
-            .filter_map(|square| self.squares.get(&square))
-            .flatten()
-            .copied()
-            .collect();
-        ids.sort_unstable();
-        ids.dedup();
-        ids
-    }
+    leader: Option<Member>,
+    /// Of a leader: who follows it, itself among them, in canonical order.
+    group: Vec<Member>,
 }
 
 /// Observations and their groups.
 #[derive(Debug, Clone)]
 pub(super) struct Leaders<T> {
-    entries: BTreeMap<FeatureId, Entry<T>>,
-    /// Who follows whom, by leader; a leader is in its own group.
-    groups: BTreeMap<FeatureId, BTreeSet<FeatureId>>,
-    everyone: SquareIndex,
-    leading: SquareIndex,
+    slots: BTreeMap<FeatureId, Slot>,
+    entries: Slots<Entry<T>>,
+    everyone: Squares<Slot>,
+    leading: Squares<Slot>,
+    pairings: u64,
 }
 
 impl<T> Default for Leaders<T> {
     fn default() -> Self {
         Self {
-            entries: BTreeMap::new(),
-            groups: BTreeMap::new(),
-            everyone: SquareIndex::default(),
-            leading: SquareIndex::default(),
+            slots: BTreeMap::new(),
+            entries: Slots::default(),
+            everyone: Squares::default(),
+            leading: Squares::default(),
+            pairings: 0,
         }
     }
+}
+
+/// What an update has to do, and what it has done.
+#[derive(Default)]
+struct Progress {
+    changed: BTreeSet<Member>,
+    unsettled: BTreeMap<Rank, Slot>,
+    pairings: u64,
 }
 
 impl<T: Groupable> Leaders<T> {
@@ -123,148 +97,157 @@ impl<T: Groupable> Leaders<T> {
     /// or gone.
     pub(super) fn update(
         &mut self,
-        inserted: Vec<(FeatureId, T)>,
+        inserted: impl Iterator<Item = (FeatureId, T)>,
         removed: &[FeatureId],
         config: &T::Config,
-    ) -> BTreeSet<FeatureId> {
-        let mut changed = BTreeSet::new();
-        let mut unsettled: BTreeSet<Rank> = BTreeSet::new();
-        for id in removed {
-            self.take_out(*id, &mut changed, &mut unsettled);
-        }
+    ) -> BTreeSet<Member> {
+        let mut progress = Progress::default();
+        // Their places may be given to others only when nobody refers to them any more.
+        let emptied: Vec<Slot> =
+            removed.iter().filter_map(|id| self.take_out(*id, &mut progress)).collect();
         for (id, item) in inserted {
-            if self.entries.contains_key(&id) {
+            if self.slots.contains_key(&id) {
                 continue;
             }
             let rank = Rank::of(item.merit(), id);
-            self.everyone.insert(id, item.reach());
-            self.entries.insert(id, Entry { item, rank, leader: None });
-            unsettled.insert(rank);
+            let reach = item.reach();
+            let slot = self.entries.add(Entry { item, rank, leader: None, group: Vec::new() });
+            self.slots.insert(id, slot);
+            self.everyone.insert(slot, reach);
+            progress.unsettled.insert(rank, slot);
         }
-        while let Some(rank) = unsettled.pop_first() {
-            self.settle(rank, config, &mut changed, &mut unsettled);
+        while let Some((_, slot)) = progress.unsettled.pop_first() {
+            self.settle(slot, config, &mut progress);
         }
-        changed
+        self.entries.release(emptied);
+        self.pairings += progress.pairings;
+        progress.changed
+    }
+
+    /// How many pairs have been held against each other.
+    pub(super) fn pairings(&self) -> u64 {
+        self.pairings
     }
 
     /// The group of a leader in canonical order, the leader included; `None` if it leads none.
-    pub(super) fn group(&self, leader: FeatureId) -> Option<impl Iterator<Item = (FeatureId, &T)>> {
-        self.groups.get(&leader).map(|ids| {
-            ids.iter().filter_map(|id| self.entries.get(id).map(|entry| (*id, &entry.item)))
-        })
+    pub(super) fn group(&self, leader: Member) -> Option<impl Iterator<Item = (FeatureId, &T)>> {
+        let entry = self.entries.get(leader.slot).filter(|entry| entry.leader == Some(leader))?;
+        let members = entry.group.iter();
+        Some(members.filter_map(|m| self.entries.get(m.slot).map(|entry| (m.id, &entry.item))))
     }
 
-    /// An observation and its rank.
-    pub(super) fn get(&self, id: FeatureId) -> Option<(&T, Rank)> {
-        self.entries.get(&id).map(|entry| (&entry.item, entry.rank))
+    /// The observation of a leader and its rank.
+    pub(super) fn leader(&self, leader: Member) -> Option<(&T, Rank)> {
+        let entry = self.entries.get(leader.slot).filter(|entry| entry.leader == Some(leader))?;
+        Some((&entry.item, entry.rank))
     }
 
-    fn take_out(
-        &mut self,
-        id: FeatureId,
-        changed: &mut BTreeSet<FeatureId>,
-        unsettled: &mut BTreeSet<Rank>,
-    ) {
-        let Some(entry) = self.entries.remove(&id) else { return };
-        let reach = entry.item.reach();
-        self.everyone.remove(id, reach);
-        unsettled.remove(&entry.rank);
+    /// Returns the place that is empty now.
+    fn take_out(&mut self, id: FeatureId, progress: &mut Progress) -> Option<Slot> {
+        let slot = self.slots.remove(&id)?;
+        let entry = self.entries.take(slot)?;
+        let (reach, own) = (entry.item.reach(), Member { id, slot });
+        self.everyone.remove(slot, reach);
+        progress.unsettled.remove(&entry.rank);
         match entry.leader {
-            Some(leader) if leader == id => {
-                self.leading.remove(id, reach);
-                self.disband(id, changed, unsettled);
+            Some(leader) if leader == own => {
+                self.leading.remove(slot, reach);
+                self.disband(own, entry.group, progress);
             }
-            Some(leader) => {
-                self.leave(id, leader, changed);
-            }
+            Some(leader) => self.leave(own, leader, progress),
             None => {}
         }
+        Some(slot)
     }
 
     /// Ends the group of `leader`; all who followed have to settle anew.
-    fn disband(
-        &mut self,
-        leader: FeatureId,
-        changed: &mut BTreeSet<FeatureId>,
-        unsettled: &mut BTreeSet<Rank>,
-    ) {
-        changed.insert(leader);
-        for follower in self.groups.remove(&leader).unwrap_or_default() {
-            if let Some(entry) = self.entries.get_mut(&follower)
-                && follower != leader
+    fn disband(&mut self, leader: Member, group: Vec<Member>, progress: &mut Progress) {
+        progress.changed.insert(leader);
+        for follower in group {
+            if follower != leader
+                && let Some(entry) = self.entries.get_mut(follower.slot)
             {
                 entry.leader = None;
-                unsettled.insert(entry.rank);
+                progress.unsettled.insert(entry.rank, follower.slot);
             }
         }
     }
 
-    fn leave(&mut self, id: FeatureId, leader: FeatureId, changed: &mut BTreeSet<FeatureId>) {
-        if let Some(group) = self.groups.get_mut(&leader) {
-            group.remove(&id);
-            changed.insert(leader);
+    fn leave(&mut self, own: Member, leader: Member, progress: &mut Progress) {
+        if let Some(entry) = self.entries.get_mut(leader.slot) {
+            entry.group.retain(|member| *member != own);
+            progress.changed.insert(leader);
         }
     }
 
     /// Settles one observation; everything before it in rank is settled already.
-    fn settle(
-        &mut self,
-        rank: Rank,
-        config: &T::Config,
-        changed: &mut BTreeSet<FeatureId>,
-        unsettled: &mut BTreeSet<Rank>,
-    ) {
-        let id = rank.id;
-        let Some(entry) = self.entries.get(&id) else { return };
-        let (before, reach) = (entry.leader, entry.item.reach());
-        let now = self.best_leader(rank, config).unwrap_or(id);
+    fn settle(&mut self, slot: Slot, config: &T::Config, progress: &mut Progress) {
+        let Some(entry) = self.entries.get(slot) else { return };
+        let (before, reach, rank) = (entry.leader, entry.item.reach(), entry.rank);
+        let own = Member { id: rank.id, slot };
+        let now = self.best_leader(entry, config, &mut progress.pairings).unwrap_or(own);
         if before == Some(now) {
             return;
         }
         match before {
-            Some(leader) if leader == id => {
-                self.leading.remove(id, reach);
-                self.disband(id, changed, unsettled);
+            Some(leader) if leader == own => {
+                self.leading.remove(slot, reach);
+                let group = self.entries.get_mut(slot).map(|e| std::mem::take(&mut e.group));
+                self.disband(own, group.unwrap_or_default(), progress);
             }
-            Some(leader) => self.leave(id, leader, changed),
+            Some(leader) => self.leave(own, leader, progress),
             None => {}
         }
-        if let Some(entry) = self.entries.get_mut(&id) {
+        if let Some(entry) = self.entries.get_mut(slot) {
             entry.leader = Some(now);
         }
-        self.groups.entry(now).or_default().insert(id);
-        changed.insert(now);
-        if now == id {
-            self.leading.insert(id, reach);
-            self.unsettle_followers(rank, config, unsettled);
+        if let Some(leader) = self.entries.get_mut(now.slot) {
+            let at = leader.group.partition_point(|member| member.id < own.id);
+            leader.group.insert(at, own);
+        }
+        progress.changed.insert(now);
+        if now == own {
+            self.leading.insert(slot, reach);
+            self.unsettle_followers(slot, config, progress);
         }
     }
 
-    fn best_leader(&self, rank: Rank, config: &T::Config) -> Option<FeatureId> {
-        let follower = &self.entries.get(&rank.id)?.item;
-        let mut best: Option<(f64, FeatureId)> = None;
-        for id in self.leading.near(follower.reach()) {
-            let Some(leader) = self.entries.get(&id).filter(|leader| leader.rank < rank) else {
+    fn best_leader(
+        &self,
+        follower: &Entry<T>,
+        config: &T::Config,
+        pairings: &mut u64,
+    ) -> Option<Member> {
+        let mut best: Option<(f64, Member)> = None;
+        for slot in self.leading.near(follower.item.reach()) {
+            let Some(leader) = self.entries.get(slot).filter(|entry| entry.rank < follower.rank)
+            else {
                 continue;
             };
-            if let Some(cost) = leader.item.pairing(follower, config)
-                && best.is_none_or(|(least, _)| cost < least)
+            let member = Member { id: leader.rank.id, slot };
+            *pairings += 1;
+            if let Some(cost) = leader.item.pairing(&follower.item, config)
+                && best.is_none_or(|(least, other)| {
+                    cost < least || (cost <= least && member.id < other.id)
+                })
             {
-                best = Some((cost, id));
+                best = Some((cost, member));
             }
         }
-        best.map(|(_, id)| id)
+        best.map(|(_, member)| member)
     }
 
     /// A new leader: whoever comes later and pairs with it may want to follow it.
-    fn unsettle_followers(&self, rank: Rank, config: &T::Config, unsettled: &mut BTreeSet<Rank>) {
-        let Some(leader) = self.entries.get(&rank.id) else { return };
-        for id in self.everyone.near(leader.item.reach()) {
-            if let Some(other) = self.entries.get(&id)
-                && other.rank > rank
-                && leader.item.pairing(&other.item, config).is_some()
-            {
-                unsettled.insert(other.rank);
+    fn unsettle_followers(&self, slot: Slot, config: &T::Config, progress: &mut Progress) {
+        let Some(leader) = self.entries.get(slot) else { return };
+        for slot in self.everyone.near(leader.item.reach()) {
+            let Some(other) = self.entries.get(slot).filter(|other| other.rank > leader.rank)
+            else {
+                continue;
+            };
+            progress.pairings += 1;
+            if leader.item.pairing(&other.item, config).is_some() {
+                progress.unsettled.insert(other.rank, slot);
             }
         }
     }

@@ -1,20 +1,19 @@
 //! From pieces that are joined one after the other to chains whose outlines are valid.
 
-use std::collections::BTreeMap;
-
 use super::VectorConfig;
 use super::chain::{Chain, ChainId, ChainKind, Vertex};
-use super::chains::Published;
 use super::crossing::{doubled_area, first_crossing};
+use super::joinable::Joinable;
 use super::joint::{Joint, free_end};
-use super::piece::{Piece, PieceKey};
+use super::piece::{Piece, PieceAt, PieceKey};
+use super::slots::Slots;
 use crate::geometry::Point;
-use crate::level::FeatureId;
 
 /// A piece and how it is joined to the next one.
 #[derive(Debug, Clone)]
 pub(super) struct Link {
     pub(super) key: PieceKey,
+    pub(super) at: PieceAt,
     pub(super) piece: Piece,
     /// From its head; `None` at the end of an open chain.
     pub(super) joint: Option<Joint>,
@@ -134,12 +133,12 @@ fn vertices(links: &[Link], is_closed: bool) -> Vec<Vertex> {
 
 impl SimplePart {
     /// The chain and its identity. A ring begins with the edge that it is called after.
-    pub(super) fn chain(&self, published: &BTreeMap<FeatureId, Published>) -> (ChainId, Chain) {
+    pub(super) fn chain(&self, joinable: &Slots<Box<Joinable>>) -> (ChainId, Chain) {
         let mut links: Vec<&Link> = self.links.iter().collect();
         let mut vertices = self.vertices.clone();
         let name = |link: &Link| {
-            let segment = published.get(&link.key.segment)?;
-            let id = segment.chain_id(link.key);
+            let segment = joinable.get(link.at.slot)?;
+            let id = segment.chain_id(link.at.part);
             Some((segment.rank, id.piece.unsigned_abs(), id))
         };
         let names = links.iter().enumerate().filter_map(|(at, link)| Some((name(link)?, at)));

@@ -3,9 +3,10 @@
 
 use std::sync::Arc;
 
+use super::slots::Slot;
 use super::{EndKind, Facing, Segment, VectorConfig};
 use crate::geometry::{Covariance, Point, unit_normal};
-use crate::level::{ContributionId, FeatureId};
+use crate::level::FeatureId;
 
 /// Name of a piece: a segment and the place among its solid parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -14,15 +15,12 @@ pub(super) struct PieceKey {
     pub(super) part: u16,
 }
 
-impl PieceKey {
-    /// Not after any other.
-    pub(super) const FIRST: Self =
-        Self { segment: FeatureId { contribution: ContributionId([0; 16]), index: 0 }, part: 0 };
-    /// Not before any other.
-    pub(super) const LAST: Self = Self {
-        segment: FeatureId { contribution: ContributionId([u8::MAX; 16]), index: u16::MAX },
-        part: u16::MAX,
-    };
+/// The same, by the place of the segment's wall: found without a search, but not a function of the
+/// set of contributions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct PieceAt {
+    pub(super) slot: Slot,
+    pub(super) part: u16,
 }
 
 /// One end of a piece.

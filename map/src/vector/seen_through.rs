@@ -3,7 +3,7 @@
 use super::VectorConfig;
 use super::wall::Wall;
 use crate::geometry::{Interval, Point};
-use crate::raster::{Cell, LogOdds, SensorClass, Tile, TileIndex, TileKey};
+use crate::raster::{Blocks, Cell, LogOdds, SensorClass, Tile, TileIndex, TileKey};
 
 /// Read access to the grid's evidence for the vector fold.
 pub(crate) trait Evidence {
@@ -14,13 +14,17 @@ pub(crate) trait Evidence {
 }
 
 /// Reads cells of the scanner layer; neighbours mostly share a tile, which is looked up once.
-struct Reader<'a, E> {
+pub(super) struct Reader<'a, E> {
     grid: &'a E,
     tile: Option<(TileIndex, Option<&'a Tile>)>,
 }
 
-impl<E: Evidence> Reader<'_, E> {
-    fn value(&mut self, p: &Point) -> i32 {
+impl<'a, E: Evidence> Reader<'a, E> {
+    pub(super) fn new(grid: &'a E) -> Self {
+        Self { grid, tile: None }
+    }
+
+    pub(super) fn value(&mut self, p: &Point) -> i32 {
         let (index, offset) = Cell::holding(p, self.grid.resolution()).tile();
         let tile = match self.tile {
             Some((at, tile)) if at == index => tile,
@@ -68,17 +72,16 @@ pub(super) fn seen_through<E: Evidence>(
     let free_below = LogOdds::from_nat(config.free_below).0;
     let one_look = LogOdds::from_nat(config.free_look).0.max(1);
     let towards_free = wall.towards_free * resolution;
-    let step = ((resolution * 1e3).round() as i64).max(1);
+    let step = step_mm(resolution);
     let least = (config.seen_through_min * 1e3).round() as i64;
-    let mut reader = Reader { grid, tile: None };
+    let mut reader = Reader::new(grid);
     let (mut through, mut went_through) = (Vec::new(), Vec::new());
     for piece in pieces {
         let mut open: Option<i64> = None;
-        // Samples sit on multiples of the step, so that they do not move when the piece grows.
-        let mut at = piece.from.div_euclid(step) * step;
-        while at < piece.to {
+        let mut end = piece.from;
+        for at in samples(piece, step) {
             let middle = at + step / 2;
-            let p = wall.axes.at(middle as f64 * 1e-3);
+            let p = middle_of_sample(wall, at, step);
             let mut value = |cells: i32| reader.value(&(p + towards_free * f64::from(cells)));
             let lies_in_free_space =
                 (-CELLS_BESIDE..=CELLS_BESIDE).all(|cells| value(cells) < free_below);
@@ -101,10 +104,10 @@ pub(super) fn seen_through<E: Evidence>(
                 }
                 _ => {}
             }
-            at += step;
+            end = at + step;
         }
         if let Some(from) = open {
-            through.push(Interval { from, to: at });
+            through.push(Interval { from, to: end });
         }
         through.retain(|i| i.length() >= least || i.from <= piece.from || i.to >= piece.to);
     }
@@ -118,29 +121,38 @@ pub(super) fn all_free<'a, E: Evidence>(
     config: &VectorConfig,
 ) -> bool {
     let free_below = LogOdds::from_nat(config.free_below).0;
-    let mut reader = Reader { grid, tile: None };
+    let mut reader = Reader::new(grid);
     let mut points = points.peekable();
     points.peek().is_some() && points.all(|p| reader.value(p) < free_below)
 }
 
-/// The tiles that the evidence for or against a wall may lie in.
-pub(super) fn tiles_along(wall: &Wall, resolution: f64) -> Vec<TileIndex> {
-    let side = resolution * crate::raster::TILE_SIDE as f64;
-    let mut tiles = Vec::new();
-    for piece in &wall.seen {
-        let samples = (piece.length() as f64 * 1e-3 / (0.25 * side)).ceil() as i64;
-        for i in 0..=samples.max(1) {
-            let t =
-                piece.from_m() + (piece.to_m() - piece.from_m()) * i as f64 / samples.max(1) as f64;
-            let p = wall.axes.at(t);
-            let margin = 0.5 * side;
-            for corner in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
-                let q = p + Point::new(corner.0, corner.1) * margin;
-                tiles.push(Cell::holding(&q, resolution).tile().0);
-            }
-        }
-    }
-    tiles.sort_unstable();
-    tiles.dedup();
-    tiles
+/// The blocks of cells that [`seen_through`] reads for what was seen of a wall.
+pub(super) fn blocks_along(wall: &Wall, resolution: f64) -> Vec<(TileIndex, Blocks)> {
+    let step = step_mm(resolution);
+    let towards_free = wall.towards_free * resolution;
+    let samples = wall.seen.iter().flat_map(|piece| samples(piece, step));
+    let places = samples.flat_map(|at| {
+        let p = middle_of_sample(wall, at, step);
+        let behind = CELLS_BEHIND.iter().map(|cells| -cells);
+        behind
+            .chain(-CELLS_BESIDE..=CELLS_BESIDE)
+            .map(move |cells| p + towards_free * f64::from(cells))
+    });
+    Blocks::under(places, resolution)
+}
+
+/// Length of a sample, millimetres.
+fn step_mm(resolution: f64) -> i64 {
+    ((resolution * 1e3).round() as i64).max(1)
+}
+
+/// Where the samples of a piece begin. They sit on multiples of the step, so that they do not move
+/// when the piece grows.
+fn samples(piece: &Interval, step: i64) -> impl Iterator<Item = i64> + use<> {
+    let (first, end) = (piece.from.div_euclid(step), piece.to);
+    (first..).map(move |number| number * step).take_while(move |at| *at < end)
+}
+
+fn middle_of_sample(wall: &Wall, at: i64, step: i64) -> Point {
+    wall.axes.at((at + step / 2) as f64 * 1e-3)
 }

@@ -5,14 +5,14 @@ use std::sync::Arc;
 
 use nalgebra::Matrix2;
 
-use super::by_tile::ByTile;
+use super::by_block::ByBlock;
 use super::explained::Explained;
-use super::leaders::{Groupable, Leaders};
+use super::leaders::{Groupable, Leaders, Member};
 use super::seen_through::{Evidence, all_free};
-use super::{Cluster, ObservedCluster, Segment, VectorConfig};
+use super::{Cluster, ObservedCluster, Segment, VectorConfig, Work};
 use crate::geometry::{Covariance, Point, convex_hull, distance_to_hull};
 use crate::level::{Contribution, FeatureId, RobotName};
-use crate::raster::{Cell, TileIndex};
+use crate::raster::{Blocks, TileIndex, Touched};
 
 /// A cluster as one look saw it, in the level frame.
 #[derive(Debug, Clone)]
@@ -84,7 +84,7 @@ pub(crate) struct Things {
     sights: Leaders<Sight>,
     /// Every cluster, published or not.
     clusters: BTreeMap<FeatureId, Arc<Cluster>>,
-    by_tile: ByTile,
+    by_block: ByBlock<FeatureId>,
     explained: Explained,
 }
 
@@ -96,7 +96,7 @@ impl Things {
         &mut self,
         inserted: &[&Contribution],
         removed: &[&Contribution],
-        touched: &BTreeSet<TileIndex>,
+        touched: &Touched,
         changed: &BTreeSet<FeatureId>,
         segments: &BTreeMap<FeatureId, Arc<Segment>>,
         grid: &E,
@@ -113,13 +113,12 @@ impl Things {
             .iter()
             .flat_map(|look| (0_u16..).zip(&look.clusters).map(|(i, _)| id(look, i)))
             .collect();
-        let mut unpublished = self.sights.update(sights.collect(), &gone, config);
-        for id in &unpublished {
-            self.fuse(*id, grid.resolution());
+        let regrouped = self.sights.update(sights, &gone, config);
+        for leader in &regrouped {
+            self.fuse(*leader, grid.resolution());
         }
-        for tile in touched {
-            unpublished.extend(self.by_tile.of(*tile));
-        }
+        let mut unpublished: BTreeSet<FeatureId> = regrouped.iter().map(|m| m.id).collect();
+        unpublished.extend(self.by_block.touched(touched));
         unpublished.extend(self.explained.follow(changed, segments));
         let mut changed = BTreeSet::new();
         for id in unpublished {
@@ -140,25 +139,31 @@ impl Things {
         changed
     }
 
+    /// What this has done so far.
+    pub(crate) fn work(&self) -> Work {
+        Work { pairings: self.sights.pairings(), ..Work::default() }
+    }
+
     /// Makes the cluster of a group anew, or ends it with its group.
-    fn fuse(&mut self, id: FeatureId, resolution: f64) {
+    fn fuse(&mut self, leader: Member, resolution: f64) {
+        let id = leader.id;
         if let Some(old) = self.clusters.remove(&id) {
-            self.by_tile.remove(id, &tiles_of(&old, resolution));
+            self.by_block.remove(id, &blocks_of(&old, resolution));
             self.explained.forget(id, &old);
         }
-        let Some(group) = self.sights.group(id) else { return };
+        let Some(group) = self.sights.group(leader) else { return };
         if let Some(cluster) = fuse_group(group) {
-            self.by_tile.insert(id, &tiles_of(&cluster, resolution));
+            self.by_block.insert(id, &blocks_of(&cluster, resolution));
             self.explained.note(id, &cluster);
             self.clusters.insert(id, Arc::new(cluster));
         }
     }
 }
 
-/// The tiles under a hull's corners and centre.
-fn tiles_of(cluster: &Cluster, resolution: f64) -> BTreeSet<TileIndex> {
+/// The blocks under a hull's corners and centre.
+fn blocks_of(cluster: &Cluster, resolution: f64) -> Vec<(TileIndex, Blocks)> {
     let points = cluster.hull.iter().chain([&cluster.centroid]);
-    points.map(|p| Cell::holding(p, resolution).tile().0).collect()
+    Blocks::under(points.copied(), resolution)
 }
 
 /// Hull of all hulls, centroid averaged by points. Looks at one thing see different sides of it, and

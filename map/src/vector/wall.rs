@@ -35,6 +35,17 @@ pub(super) struct Wall {
     pub(super) last_seen_us: i64,
 }
 
+/// How the directions in which two walls are free stand to each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Facings {
+    /// The same: they may be one wall seen twice.
+    Same,
+    /// Opposite: they may be the two faces of one wall.
+    Opposite,
+    /// Neither: they have nothing to tell of each other.
+    Across,
+}
+
 /// Pieces that are not further apart than this count as one, millimetres.
 const BRIDGE_MM: i64 = 150;
 /// An end of a look counts for an end of the wall if it is not further from it, millimetres.
@@ -159,6 +170,19 @@ impl Wall {
         self.looks_at((self.axes.along(p) * 1e3).round() as i64)
     }
 
+    /// How this wall and `other` stand to each other. Symmetric.
+    pub(super) fn facings(&self, other: &Self, config: &VectorConfig) -> Facings {
+        let cosine = self.towards_free.dot(&other.towards_free);
+        let least = config.angle_max.cos();
+        if cosine >= least {
+            Facings::Same
+        } else if cosine < -least {
+            Facings::Opposite
+        } else {
+            Facings::Across
+        }
+    }
+
     /// Whether `other` may be the other face of this wall: it faces the opposite side and lies not
     /// further than `config.thickness_max` behind.
     pub(super) fn is_backed_by(&self, other: &Self, config: &VectorConfig) -> bool {
@@ -168,7 +192,7 @@ impl Wall {
             let depth = free.dot(&(self.axes.at(self.axes.along(&p)) - p));
             (-config.duplicate_offset..=config.thickness_max).contains(&depth)
         };
-        free.dot(&other.towards_free) < -config.angle_max.cos() && other.seen.iter().any(behind)
+        self.facings(other, config) == Facings::Opposite && other.seen.iter().any(behind)
     }
 
     /// What is known of the wall's end at `at` millimetres: a corner rather than a physical end rather
@@ -187,7 +211,7 @@ impl Wall {
         other_pieces: impl Iterator<Item = Interval>,
         config: &VectorConfig,
     ) -> Vec<Interval> {
-        if self.towards_free.dot(&other.towards_free) < config.angle_max.cos() {
+        if self.facings(other, config) != Facings::Same {
             return Vec::new();
         }
         let across = |t: f64| other.axes.across(&self.axes.at(t)).abs() <= config.duplicate_offset;

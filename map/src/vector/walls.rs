@@ -3,48 +3,63 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::by_tile::ByTile;
-use super::leaders::{Leaders, Rank, SquareIndex};
-use super::seen_through::{Evidence, seen_through, tiles_along};
+use super::by_block::ByBlock;
+use super::leaders::{Leaders, Member, Rank};
+use super::seen_through::{Evidence, SeenThrough, blocks_along, seen_through};
 use super::sighting::Sighting;
-use super::wall::Wall;
-use super::{EndKind, Segment, SolidInterval, VectorConfig};
+use super::slots::{Slot, Slots};
+use super::squares::{Extent, Squares};
+use super::wall::{Facings, Wall};
+use super::{EndKind, Segment, SolidInterval, VectorConfig, Work};
 use crate::geometry::{Point, subtract_intervals};
 use crate::level::{Contribution, FeatureId};
-use crate::raster::TileIndex;
+use crate::raster::{Blocks, TileIndex, Touched};
 
 /// A wall with its place in the order of publication.
 #[derive(Debug, Clone)]
 struct Placed {
     wall: Wall,
     rank: Rank,
-    /// Lower left and upper right corner of where another wall may be the same one.
-    reach: (Point, Point),
-    tiles: Vec<TileIndex>,
+    /// Where another wall may be the same one.
+    reach: Extent,
+    /// The evidence that says which parts of it are seen through.
+    depends_on: Vec<(TileIndex, Blocks)>,
+    /// `None` if it may have changed.
+    through: Option<SeenThrough>,
+    published: Option<Arc<Segment>>,
 }
 
 /// The state of the fold of segments.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Walls {
     sightings: Leaders<Sighting>,
-    placed: BTreeMap<FeatureId, Placed>,
-    places: SquareIndex,
-    by_tile: ByTile,
+    /// In the places of their leaders.
+    placed: Slots<Box<Placed>>,
+    places: Squares<Slot>,
+    by_block: ByBlock<Slot>,
+    work: Work,
+}
+
+/// What an update has to do, and what it has done.
+struct Progress<'a> {
+    unpublished: BTreeMap<Rank, Slot>,
+    published: &'a mut BTreeMap<FeatureId, Arc<Segment>>,
+    changed: BTreeSet<Member>,
 }
 
 impl Walls {
-    /// Puts the segments of some contributions in and takes those of others out. `touched` are
-    /// the scanner tiles that changed with them. Published segments are brought up to date in
+    /// Puts the segments of some contributions in and takes those of others out. `touched` is the
+    /// scanner evidence that changed with them. Published segments are brought up to date in
     /// `published`; returns those that are new, different or gone.
     pub(crate) fn update<E: Evidence>(
         &mut self,
         inserted: &[&Contribution],
         removed: &[&Contribution],
-        touched: &BTreeSet<TileIndex>,
+        touched: &Touched,
         grid: &E,
         published: &mut BTreeMap<FeatureId, Arc<Segment>>,
         config: &VectorConfig,
-    ) -> BTreeSet<FeatureId> {
+    ) -> BTreeSet<Member> {
         let sightings = inserted.iter().flat_map(|look| {
             (0_u16..).zip(&look.segments).map(|(index, segment)| {
                 let id = FeatureId { contribution: look.id, index };
@@ -59,133 +74,173 @@ impl Walls {
                     .map(|(index, _)| FeatureId { contribution: look.id, index })
             })
             .collect();
-        let regrouped = self.sightings.update(sightings.collect(), &gone, config);
+        let regrouped = self.sightings.update(sightings, &gone, config);
 
-        let mut changed = BTreeSet::new();
-        let mut unpublished: BTreeSet<Rank> = BTreeSet::new();
-        for id in regrouped {
-            self.remake(id, grid.resolution(), config, &mut unpublished, published, &mut changed);
+        let mut progress =
+            Progress { unpublished: BTreeMap::new(), published, changed: BTreeSet::new() };
+        for leader in regrouped {
+            self.remake(leader, grid.resolution(), config, &mut progress);
         }
-        for tile in touched {
-            for id in self.by_tile.of(*tile) {
-                if let Some(placed) = self.placed.get(&id) {
-                    unpublished.insert(placed.rank);
-                }
+        for slot in self.by_block.touched(touched) {
+            if let Some(placed) = self.placed.get_mut(slot) {
+                placed.through = None;
+                progress.unpublished.insert(placed.rank, slot);
             }
         }
         // In rank order: what is published of a wall depends on what is published of better ones.
-        while let Some(rank) = unpublished.pop_first() {
-            self.publish(rank, grid, config, &mut unpublished, published, &mut changed);
+        while let Some((_, slot)) = progress.unpublished.pop_first() {
+            self.publish(slot, grid, config, &mut progress);
         }
-        changed
+        progress.changed
     }
 
-    /// The rank and the middle of the observation that a wall is called after.
-    pub(super) fn founder(&self, id: FeatureId) -> Option<(Rank, Point)> {
-        self.sightings.get(id).map(|(leader, rank)| (rank, leader.middle))
+    /// What this has done so far.
+    pub(crate) fn work(&self) -> Work {
+        Work { pairings: self.sightings.pairings(), ..self.work }
+    }
+
+    /// What is published of a wall, with the rank and the middle of the observation that it is
+    /// called after.
+    pub(super) fn published(&self, leader: Member) -> Option<(&Arc<Segment>, Rank, Point)> {
+        let (founder, rank) = self.sightings.leader(leader)?;
+        let segment = self.placed.get(leader.slot)?.published.as_ref()?;
+        Some((segment, rank, founder.middle))
     }
 
     /// Makes the wall of a group anew, or ends it with its group.
     fn remake(
         &mut self,
-        id: FeatureId,
+        leader: Member,
         resolution: f64,
         config: &VectorConfig,
-        unpublished: &mut BTreeSet<Rank>,
-        published: &mut BTreeMap<FeatureId, Arc<Segment>>,
-        changed: &mut BTreeSet<FeatureId>,
+        progress: &mut Progress,
     ) {
-        if let Some(old) = self.placed.remove(&id) {
-            self.places.remove(id, old.reach);
-            self.by_tile.remove(id, &old.tiles);
-            unpublished.remove(&old.rank);
-            unpublished.extend(self.near(old.reach).map(|(_, placed)| placed.rank));
+        let slot = leader.slot;
+        let mut published = None;
+        if let Some(mut old) = self.placed.take(slot) {
+            self.places.remove(slot, old.reach);
+            self.by_block.remove(slot, &old.depends_on);
+            progress.unpublished.remove(&old.rank);
+            published = old.published.take();
+            self.unsettle_neighbours(&old, config, progress);
         }
-        let made = self.sightings.get(id).and_then(|(leader, rank)| {
-            let group: Vec<(FeatureId, &Sighting)> = self.sightings.group(id)?.collect();
-            Some((Wall::new(group.iter().copied(), leader, config)?, rank))
+        let made = self.sightings.leader(leader).and_then(|(sighting, rank)| {
+            let group: Vec<(FeatureId, &Sighting)> = self.sightings.group(leader)?.collect();
+            Some((Wall::new(group.iter().copied(), sighting, config)?, rank))
         });
         match made {
             Some((wall, rank)) => {
-                let tiles = tiles_along(&wall, resolution);
+                self.work.walls_fused += 1;
+                let depends_on = blocks_along(&wall, resolution);
                 let reach = reach(&wall);
-                self.places.insert(id, reach);
-                self.by_tile.insert(id, &tiles);
-                self.placed.insert(id, Placed { wall, rank, reach, tiles });
-                // It may be the other face of any of them; the wall itself is among them.
-                unpublished.extend(self.near(reach).map(|(_, placed)| placed.rank));
+                let placed = Placed { wall, rank, reach, depends_on, through: None, published };
+                self.unsettle_neighbours(&placed, config, progress);
+                self.places.insert(slot, reach);
+                self.by_block.insert(slot, &placed.depends_on);
+                self.placed.put(slot, Box::new(placed));
+                progress.unpublished.insert(rank, slot);
             }
             None => {
-                if published.remove(&id).is_some() {
-                    changed.insert(id);
+                if published.is_some() {
+                    progress.published.remove(&leader.id);
+                    progress.changed.insert(leader);
                 }
             }
         }
     }
 
-    /// All walls whose reach overlaps `reach`.
-    fn near(&self, reach: (Point, Point)) -> impl Iterator<Item = (FeatureId, &Placed)> {
-        let (low, high) = reach;
+    /// A wall comes or goes: those that it is the other face of, and later ones that may publish
+    /// what it saw too, have to be looked at again.
+    fn unsettle_neighbours(
+        &mut self,
+        placed: &Placed,
+        config: &VectorConfig,
+        progress: &mut Progress,
+    ) {
+        for slot in self.places.near(placed.reach) {
+            let Some(other) = self.placed.get_mut(slot) else { continue };
+            match placed.wall.facings(&other.wall, config) {
+                Facings::Opposite => other.through = None,
+                Facings::Same if other.rank > placed.rank => {}
+                Facings::Same | Facings::Across => continue,
+            }
+            progress.unpublished.insert(other.rank, slot);
+        }
+    }
+
+    /// All walls whose reach overlaps that of `placed`.
+    fn near(&self, placed: &Placed) -> impl Iterator<Item = (Slot, &Placed)> {
+        let (low, high) = placed.reach;
         self.places
-            .near(reach)
-            .into_iter()
-            .filter_map(|id| Some((id, self.placed.get(&id)?)))
-            .filter(move |(_, placed)| {
-                let (from, to) = placed.reach;
+            .near(placed.reach)
+            .filter_map(|slot| Some((slot, self.placed.get(slot)?.as_ref())))
+            .filter(move |(_, other)| {
+                let (from, to) = other.reach;
                 from.x <= high.x && low.x <= to.x && from.y <= high.y && low.y <= to.y
             })
     }
 
     fn publish<E: Evidence>(
-        &self,
-        rank: Rank,
+        &mut self,
+        slot: Slot,
         grid: &E,
         config: &VectorConfig,
-        unpublished: &mut BTreeSet<Rank>,
-        published: &mut BTreeMap<FeatureId, Arc<Segment>>,
-        changed: &mut BTreeSet<FeatureId>,
+        progress: &mut Progress,
     ) {
-        let Some(placed) = self.placed.get(&rank.id) else { return };
-        let segment = self.segment(placed, grid, published, config);
-        if published.get(&rank.id).map(AsRef::as_ref) == segment.as_ref() {
-            return;
+        let Some(mut placed) = self.placed.take(slot) else { return };
+        if placed.through.is_none() {
+            self.work.walls_against_grid += 1;
+            placed.through = Some(self.through(&placed, grid, config));
         }
-        match segment {
-            Some(segment) => published.insert(rank.id, Arc::new(segment)),
-            None => published.remove(&rank.id),
-        };
-        changed.insert(rank.id);
-        // Later walls may publish what this one saw too.
-        let later = self.near(placed.reach).filter(|(_, other)| other.rank > rank);
-        unpublished.extend(later.map(|(_, other)| other.rank));
+        self.work.walls_published += 1;
+        let segment = self.segment(&placed, config);
+        if placed.published.as_deref() != segment.as_ref() {
+            let id = placed.rank.id;
+            placed.published = segment.map(Arc::new);
+            match &placed.published {
+                Some(segment) => progress.published.insert(id, Arc::clone(segment)),
+                None => progress.published.remove(&id),
+            };
+            progress.changed.insert(Member { id, slot });
+            // Later walls may publish what this one saw too.
+            let later = self.near(&placed).filter(|(_, other)| {
+                let facings = placed.wall.facings(&other.wall, config);
+                other.rank > placed.rank && facings == Facings::Same
+            });
+            progress.unpublished.extend(later.map(|(slot, other)| (other.rank, slot)));
+        }
+        self.placed.put(slot, placed);
+    }
+
+    /// What the grid says against a wall.
+    fn through<E: Evidence>(
+        &self,
+        placed: &Placed,
+        grid: &E,
+        config: &VectorConfig,
+    ) -> SeenThrough {
+        let wall = &placed.wall;
+        let others = self.near(placed).map(|(_, other)| &other.wall);
+        let backs: Vec<&Wall> = others.filter(|other| wall.is_backed_by(other, config)).collect();
+        seen_through(wall, &wall.seen, &backs, grid, config)
     }
 
     /// What is published of a wall: what was seen of it, without what scanners look through and
     /// without what better walls nearby already publish.
-    fn segment<E: Evidence>(
-        &self,
-        placed: &Placed,
-        grid: &E,
-        published: &BTreeMap<FeatureId, Arc<Segment>>,
-        config: &VectorConfig,
-    ) -> Option<Segment> {
-        let wall = &placed.wall;
-        let neighbours: Vec<(FeatureId, &Placed)> = self.near(placed.reach).collect();
-        let backs: Vec<&Wall> = neighbours
-            .iter()
-            .map(|(_, other)| &other.wall)
-            .filter(|other| wall.is_backed_by(other, config))
-            .collect();
-        let through = seen_through(wall, &wall.seen, &backs, grid, config);
+    fn segment(&self, placed: &Placed, config: &VectorConfig) -> Option<Segment> {
+        let (wall, through) = (&placed.wall, placed.through.as_ref()?);
         let mut pieces = subtract_intervals(&wall.seen, &through.open);
-        for (id, other) in neighbours {
-            if other.rank < placed.rank
-                && let Some(segment) = published.get(&id)
-            {
-                let theirs = segment.solid.iter().map(|s| s.span);
-                let twice = wall.duplicated(&pieces, &other.wall, theirs, config);
-                pieces = subtract_intervals(&pieces, &twice);
-            }
+        let mut better: Vec<&Placed> = self
+            .near(placed)
+            .filter(|(_, other)| other.rank < placed.rank && other.published.is_some())
+            .filter(|(_, other)| wall.facings(&other.wall, config) == Facings::Same)
+            .map(|(_, other)| other)
+            .collect();
+        better.sort_unstable_by_key(|other| other.rank.id);
+        for other in better {
+            let solid = other.published.iter().flat_map(|segment| &segment.solid);
+            let twice = wall.duplicated(&pieces, &other.wall, solid.map(|s| s.span), config);
+            pieces = subtract_intervals(&pieces, &twice);
         }
         let least = (config.length_min * 1e3).round() as i64;
         let solid: Vec<SolidInterval> = pieces
@@ -194,7 +249,7 @@ impl Walls {
             .map(|span| {
                 let end = |at| wall.end_kind(at).unwrap_or(EndKind::Jump);
                 let ends = [end(span.from), end(span.to)];
-                SolidInterval { span, ends, existence: wall.existence(span, &through, config) }
+                SolidInterval { span, ends, existence: wall.existence(span, through, config) }
             })
             .filter(|piece| piece.existence.nat() > config.existence_min)
             .collect();
@@ -213,7 +268,7 @@ impl Walls {
 }
 
 /// The surroundings in which another wall may be the same one.
-fn reach(wall: &Wall) -> (Point, Point) {
+fn reach(wall: &Wall) -> Extent {
     const MARGIN: f64 = 0.25;
     let (low, high) = wall.extent();
     let margin = Point::new(MARGIN, MARGIN);

@@ -7,4 +7,5 @@ mod existence;
 mod honesty;
 mod set_function;
 mod walls;
+mod work;
 mod world;

@@ -103,7 +103,7 @@ pub(crate) fn id(seed: u64, number: u64) -> ContributionId {
 const ROOMS: [[f64; 4]; 2] = [[0.3, 0.2, 6.1, 5.0], [6.22, 0.2, 11.0, 5.0]];
 
 /// Evidence of free rays from the robot to the walls of its room, sampled.
-fn evidence(
+pub(crate) fn evidence(
     robot: &Pose<mapfold_map::geometry::Level, mapfold_map::geometry::Robot>,
     ends: &[Point],
     class: SensorClass,
