@@ -1,29 +1,46 @@
 //! From one scan to straight pieces of wall and to clusters, with honest covariances.
 //!
 //! The steps, each a module of its own: [`plausibility`] throws out what is no surface;
-//! [`correction`] makes ranges of readings, for scanners with a table; [`points`] gives positions with covariance; [`breakpoints`] groups beams that may lie on one
-//! surface; [`split`] proposes lines by Iterative End Point Fit and confirms them by least
-//! squares; [`fit`] is the weighted total least squares behind it; [`ends`] says where and what
-//! the ends of a wall are; [`seen_through`] says where beams went through its line beside it;
-//! [`clusters`] gathers what no line explains.
+//! [`correction`] makes ranges of readings, for scanners with a table; [`points`] gives positions
+//! with covariance; [`breakpoints`] groups beams that may lie on one surface; [`split`] proposes
+//! lines by Iterative End Point Fit, confirms them by least squares (`cloud`, `guess`, `explain`),
+//! joins them, and settles which are walls (`settle`); [`fit`] is the weighted total least squares
+//! behind it; [`ends`] says where and what the ends of a wall are; [`seen_through`] says where beams
+//! went through its line beside it; [`clusters`] gathers what no line explains.
 //!
 //! Knows neither the robot's pose nor any map: results are in the robot frame and carry the
 //! sensor's uncertainty only.
 
 pub mod breakpoints;
+mod cloud;
 pub mod clusters;
 pub mod correction;
 pub mod ends;
+mod explain;
 pub mod fit;
+mod guess;
 pub mod plausibility;
 pub mod points;
 pub mod seen_through;
 mod segment;
+mod settle;
 pub mod split;
 
+use std::ops::Range;
+
+use mapfold_map::geometry::Interval;
 use mapfold_map::vector::{ObservedCluster, ObservedSegment};
 
 use crate::sensor::{Scan, ScannerProfile};
+use breakpoints::{Gap, Ring};
+use cloud::Cloud;
+use clusters::Gatherer;
+use correction::BeamNoise;
+use points::Directions;
+use seen_through::Block;
+use segment::Mount;
+use split::{FoundLine, Splitter};
+
 pub use correction::{Corrected, Corrector};
 pub use plausibility::BeamState;
 
@@ -88,61 +105,209 @@ pub struct Features {
     pub beams: Vec<BeamUse>,
 }
 
-/// Extracts the features of a scan whose ranges need no correction.
+/// Extracts the features of a scan whose ranges need no correction. Who has many of them keeps an
+/// [`Extractor`].
 pub fn extract(scan: &Scan, config: &Config) -> Features {
-    extract_plausible(scan, &plausibility::judge(scan, &config.plausibility), config)
-}
-
-/// Extracts the features of a scan whose beams have been judged.
-pub fn extract_plausible(scan: &Scan, states: &[BeamState], config: &Config) -> Features {
-    features(scan, states, points::points(scan, states, &config.noise), config)
+    let mut extractor = Extractor::new(config.clone());
+    extractor.extract(scan);
+    extractor.features
 }
 
 /// Extracts the features of a scan whose ranges have been corrected.
 pub fn extract_corrected(corrected: &Corrected, config: &Config) -> Features {
-    let mut points = points::points(&corrected.scan, &corrected.states, &config.noise);
-    points::with_noise(&mut points, &corrected.noise);
-    features(&corrected.scan, &corrected.states, points, config)
+    let mut extractor = Extractor::new(config.clone());
+    extractor.find(&corrected.scan, &corrected.states, Some(&corrected.noise));
+    extractor.features
 }
 
-fn features(
-    scan: &Scan,
-    states: &[BeamState],
-    points: Vec<points::ScanPoint>,
-    config: &Config,
-) -> Features {
-    let ring = breakpoints::Ring { closed: scan.is_full_circle(), beams: scan.ranges.len() };
-    let (points, runs) =
-        breakpoints::runs(points, ring, scan.geometry.increment, &config.breakpoints, &config.fit);
-    let mut lines = Vec::new();
-    let mut loose = Vec::new();
-    for run in &runs {
-        split::lines(&points, run.clone(), scan.geometry.increment, config, &mut lines, &mut loose);
+/// Extracts features, scan after scan, in memory that it keeps: once it has seen scans of a kind,
+/// it allocates no more.
+#[derive(Debug)]
+pub struct Extractor {
+    config: Config,
+    corrector: Option<Corrector>,
+    corrected: Option<Corrected>,
+    directions: Directions,
+    states: Vec<BeamState>,
+    cloud: Cloud,
+    gaps: Vec<Gap>,
+    runs: Vec<Range<usize>>,
+    splitter: Splitter,
+    lines: Vec<FoundLine>,
+    loose: Vec<Range<usize>>,
+    gatherer: Gatherer,
+    blocks: Vec<Block>,
+    features: Features,
+    /// Intervals that are no longer needed.
+    spare: Vec<Vec<Interval>>,
+}
+
+impl Extractor {
+    /// An extractor for one scanner, whose ranges it corrects if there is a table for them.
+    pub fn for_scanner(profile: &ScannerProfile) -> Self {
+        let corrector = Corrector::for_scanner(profile, correction::CorrectionConfig::STANDARD);
+        Self { corrector, ..Self::new(Config::for_scanner(profile)) }
     }
-    let segments = ends::segments(&points, &runs, &lines, ring, scan, &config.ends);
-    let clusters = clusters::clusters(&points, &loose, &config.clusters);
-    let mut beams: Vec<BeamUse> = states
-        .iter()
-        .map(|state| match state {
+
+    /// An extractor that takes ranges as they come.
+    pub fn new(config: Config) -> Self {
+        Self {
+            config,
+            corrector: None,
+            corrected: None,
+            directions: Directions::default(),
+            states: Vec::new(),
+            cloud: Cloud::default(),
+            gaps: Vec::new(),
+            runs: Vec::new(),
+            splitter: Splitter::default(),
+            lines: Vec::new(),
+            loose: Vec::new(),
+            gatherer: Gatherer::default(),
+            blocks: Vec::new(),
+            features: Features::default(),
+            spare: Vec::new(),
+        }
+    }
+
+    /// Its settings.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// The features of a scan.
+    pub fn extract(&mut self, scan: &Scan) -> &Features {
+        let mut states = std::mem::take(&mut self.states);
+        let directions = self.directions.of(scan);
+        plausibility::judge_into(scan, directions, &self.config.plausibility, &mut states);
+        if let Some(corrector) = &mut self.corrector {
+            let corrected = match self.corrected.take() {
+                Some(mut corrected) => {
+                    corrector.correct_into(scan, &states, &mut corrected);
+                    corrected
+                }
+                None => corrector.correct(scan, &states),
+            };
+            self.find(&corrected.scan, &corrected.states, Some(&corrected.noise));
+            self.corrected = Some(corrected);
+        } else {
+            self.find(scan, &states, None);
+        }
+        self.states = states;
+        &self.features
+    }
+
+    /// What the beams of the last scan were.
+    pub fn states(&self) -> &[BeamState] {
+        self.corrected.as_ref().map_or(&self.states, |corrected| &corrected.states)
+    }
+
+    /// The last scan with corrected ranges, if they are corrected.
+    pub fn corrected_scan(&self) -> Option<&Scan> {
+        self.corrected.as_ref().map(|corrected| &corrected.scan)
+    }
+
+    /// The features of the last scan.
+    pub fn features(&self) -> &Features {
+        &self.features
+    }
+
+    fn find(&mut self, scan: &Scan, states: &[BeamState], noise: Option<&[BeamNoise]>) {
+        let config = &self.config;
+        let increment = scan.geometry.increment;
+        let directions = self.directions.of(scan);
+        points::points_into(scan, states, directions, &config.noise, &mut self.cloud.points);
+        if let Some(noise) = noise {
+            points::with_noise(&mut self.cloud.points, noise);
+        }
+        let ring = Ring { closed: scan.is_full_circle(), beams: scan.ranges.len() };
+        breakpoints::find_runs(
+            &mut self.cloud.points,
+            ring,
+            increment,
+            &config.breakpoints,
+            &mut self.gaps,
+            &mut self.runs,
+        );
+        self.cloud.index();
+        self.lines.clear();
+        self.loose.clear();
+        self.splitter.begin(self.cloud.points.len());
+        for run in &self.runs {
+            self.splitter.lines(
+                &self.cloud,
+                run,
+                increment,
+                config,
+                &mut self.lines,
+                &mut self.loose,
+            );
+        }
+        self.gatherer.gather(&self.cloud.points, &self.loose, &config.clusters);
+        self.describe(scan, states, ring);
+    }
+
+    /// Fills in the features from what was found.
+    fn describe(&mut self, scan: &Scan, states: &[BeamState], ring: Ring) {
+        let config = &self.config;
+        let Features { segments, clusters, beams } = &mut self.features;
+        self.spare.extend(segments.drain(..).map(|segment| {
+            let mut seen_through = segment.seen_through;
+            seen_through.clear();
+            seen_through
+        }));
+        for cluster in clusters.drain(..) {
+            self.gatherer.recycle(cluster.hull);
+        }
+        beams.clear();
+        beams.extend(states.iter().map(|state| match state {
             BeamState::Hit => BeamUse::Unexplained,
             other => BeamUse::NoPoint(*other),
-        })
-        .collect();
-    let mut features = Features::default();
-    let sweep = seen_through::Sweep { points: &points, ring, increment: scan.geometry.increment };
-    for (line, ended) in lines.iter().zip(segments) {
-        let Some(ended) = ended else { continue };
-        for &point in &line.members {
-            beams[points[point].beam] = BeamUse::Segment(features.segments.len() as u32);
+        }));
+        let points = &self.cloud.points;
+        let directions = self.directions.of(scan);
+        seen_through::blocks(&self.lines, &self.loose, &mut self.blocks);
+        let view = ends::View { points, directions, runs: &self.runs, ring, config: &config.ends };
+        let sweep = seen_through::Sweep {
+            points,
+            at: &self.cloud.at,
+            blocks: &self.blocks,
+            ring,
+            increment: scan.geometry.increment,
+        };
+        let mount = Mount::of(scan);
+        for (i, line) in self.lines.iter().enumerate() {
+            let Some(ended) = view.ends(&self.lines, i) else { continue };
+            let mut count = 0;
+            for at in line.points.clone() {
+                if !self.splitter.stray[at] {
+                    beams[points[at].beam] = BeamUse::Segment(segments.len() as u32);
+                    count += 1;
+                }
+            }
+            let room = || Vec::with_capacity(2 * config.seen_through.stretches_max);
+            let seen_through = self.spare.pop().unwrap_or_else(room);
+            segments.push(segment::in_robot_frame(
+                line,
+                count,
+                &ended,
+                &mount,
+                &sweep,
+                &config.seen_through,
+                seen_through,
+            ));
         }
-        features.segments.push(segment::in_robot_frame(line, &ended, &sweep, scan, config));
-    }
-    for cluster in clusters {
-        for &point in &cluster.members {
-            beams[points[point].beam] = BeamUse::Cluster(features.clusters.len() as u32);
+        // Places of the clusters that are large enough among all that were gathered.
+        for (place, cluster) in self.gatherer.found.iter_mut().enumerate() {
+            if cluster.count < config.clusters.points_min {
+                continue;
+            }
+            for part in self.gatherer.parts.iter().filter(|part| part.cluster == place) {
+                for at in part.points.clone() {
+                    beams[points[at].beam] = BeamUse::Cluster(clusters.len() as u32);
+                }
+            }
+            clusters.push(segment::cluster_in_robot_frame(cluster, &mount, &config.clusters));
         }
-        features.clusters.push(segment::cluster_in_robot_frame(&cluster, scan));
     }
-    features.beams = beams;
-    features
 }

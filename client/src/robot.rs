@@ -21,7 +21,7 @@ pub use odometry::{DeadReckoning, OdometryNoise};
 use crate::emulation::EmulationConfig;
 use crate::evidence::{Canvas, ScannerEvidenceConfig, SonarEvidenceConfig};
 use crate::log::{Observation, Reading};
-use crate::perception;
+use crate::perception::Extractor;
 use crate::sensor::{ScannerProfile, Sensors, SonarProfile};
 
 /// Where a robot takes its poses from.
@@ -117,7 +117,8 @@ pub struct Surveyor {
     robot: Arc<str>,
     identity: Identity,
     reckoning: DeadReckoning,
-    scanner: Option<Scanner>,
+    /// Apart, for what it keeps to work in is large.
+    scanner: Option<Box<Scanner>>,
     sonar: Option<SonarProfile>,
     sonar_evidence: SonarEvidenceConfig,
     emulation: Option<EmulationConfig>,
@@ -127,8 +128,7 @@ pub struct Surveyor {
 #[derive(Debug)]
 struct Scanner {
     profile: ScannerProfile,
-    perception: perception::Config,
-    corrector: Option<perception::Corrector>,
+    extractor: Extractor,
     evidence: ScannerEvidenceConfig,
 }
 
@@ -151,14 +151,12 @@ impl Surveyor {
             robot: Arc::from(config.robot.as_str()),
             identity: Identity::new(&config, first),
             reckoning: DeadReckoning::new(config.odometry),
-            scanner: scanner.map(|profile| Scanner {
-                perception: perception::Config::for_scanner(&profile),
-                corrector: perception::Corrector::for_scanner(
-                    &profile,
-                    perception::correction::CorrectionConfig::STANDARD,
-                ),
-                evidence: ScannerEvidenceConfig::STANDARD,
-                profile,
+            scanner: scanner.map(|profile| {
+                Box::new(Scanner {
+                    extractor: Extractor::for_scanner(&profile),
+                    evidence: ScannerEvidenceConfig::STANDARD,
+                    profile,
+                })
             }),
             sonar,
             sonar_evidence: SonarEvidenceConfig::STANDARD,

@@ -80,6 +80,60 @@ fn a_wall_across_the_seam_of_a_full_circle_is_one_wall() {
     assert!((behind[0].line.line.rho() - 3.0).abs() < 1e-6);
 }
 
+#[test]
+fn a_wall_across_the_seam_is_one_wall_with_a_corner_near_it() {
+    // The room's corner behind on the left lies 2 to 60 beams from where the scan begins and ends,
+    // on either side of it: the seam falls within either of its walls, near their end.
+    let mut chance = Chance(2);
+    let corner = 3f64.atan2(-3.0);
+    for beams in (-60_i32..=60).filter(|beams| beams.abs() > 1) {
+        for _ in 0..3 {
+            let heading = corner - PI + f64::from(beams) * 0.5 * DEGREE;
+            let scan =
+                square().scan((0.0, 0.0, heading), (720, 0.5 * DEGREE), (0.01, 0.0), &mut chance);
+            assert!(scan.is_full_circle());
+            let found = perception::extract(&scan, &config());
+            assert_eq!(found.segments.len(), 4, "corner {beams} beams from the seam");
+            for wall in &found.segments {
+                let length = wall.to - wall.from;
+                assert!(
+                    (length - 7.0).abs() < 0.1 || (length - 5.0).abs() < 0.1,
+                    "{beams}: {length}"
+                );
+                assert_eq!(wall.ends.map(|e| e.kind), [EndKind::Corner; 2], "{beams}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_wall_across_the_seam_is_one_wall_where_the_scan_has_gaps() {
+    // A wall behind with an open door on one side of the seam and nothing beyond its ends: the
+    // runs are many, and the one with the seam in it is still one wall.
+    let room = Room {
+        walls: vec![
+            [(-2.0, -1.5), (-2.0, 0.6)],
+            [(-2.0, 1.5), (-2.0, 3.0)],
+            [(-4.0, -4.0), (-4.0, 4.0)],
+        ],
+        pillars: Vec::new(),
+    };
+    let mut chance = Chance(3);
+    for _ in 0..50 {
+        let scan = room.scan((0.0, 0.0, 0.0), (720, 0.5 * DEGREE), (0.01, 0.0), &mut chance);
+        let found = perception::extract(&scan, &config());
+        let near: Vec<_> = found.segments.iter().filter(|s| s.line.line.rho() < 3.0).collect();
+        assert_eq!(near.len(), 2, "{near:#?}");
+        let across = near.iter().find(|s| s.to - s.from > 1.8).expect("the wall with the seam");
+        assert!((across.to - across.from - 2.1).abs() < 0.06);
+        // The door is seen through from both of its jambs, once.
+        assert!(
+            across.seen_through.iter().any(|i| (850..1000).contains(&i.length())),
+            "{across:#?}"
+        );
+    }
+}
+
 /// A part of a test's world that gives segments, clusters and gaps.
 fn furnished() -> Room {
     let mut room = square();
@@ -175,7 +229,9 @@ fn line_parameters_are_as_uncertain_as_they_claim() {
     let mut profile = profile();
     profile.systematic_sd_m = 0.0;
     profile.range_sd_per_m = 0.0;
-    let config = Config::for_scanner(&profile);
+    let mut config = Config::for_scanner(&profile);
+    // On a lone wall no other surface's points are to choose from.
+    config.fit.choice_factor = 1.0;
     let (rho, alpha): (f64, f64) = (2.5, 0.6);
     let wall =
         [-1.0, 2.0].map(|t| unit_normal(alpha) * rho + tangent(alpha) * t).map(|p| (p.x, p.y));
@@ -266,6 +322,28 @@ fn an_open_door_stays_open_and_its_jambs_are_jumps() {
     // Half a beam's spacing is added at each end: the door is as wide as it is, on average.
     let sd_of_mean = (variance / 200.0).sqrt();
     assert!((gap - 0.9).abs() < 4.0 * sd_of_mean, "door of {gap} m, sd {sd_of_mean}");
+}
+
+#[test]
+fn a_wall_ends_where_the_view_goes_on_behind_a_stray_reading() {
+    let room = Room {
+        walls: vec![[(2.0, -3.0), (2.0, 0.45)], [(5.0, -6.0), (5.0, 6.0)]],
+        pillars: Vec::new(),
+    };
+    let mut chance = Chance(10);
+    for strays in 0..=2 {
+        let mut scan = room.scan((0.0, 0.0, 0.0), (361, 0.5 * DEGREE), (0.005, 0.0), &mut chance);
+        let edge = scan.ranges.iter().rposition(|range| *range < 4.0).unwrap();
+        for stray in 1..=strays {
+            // Behind the wall, but not so far that a surface could not reach there.
+            scan.ranges[edge + stray] = 2.12 + 0.08 * stray as f64;
+        }
+        let found = perception::extract(&scan, &config());
+        let wall = found.segments.iter().find(|s| s.line.line.rho() < 3.0).unwrap();
+        assert_eq!(wall.ends[1].kind, EndKind::Jump, "{strays} strays");
+        let off = (wall.to - 0.45).abs();
+        assert!(off < 0.06 && off < 2.0 * wall.ends[1].sd, "{strays} strays: {off}");
+    }
 }
 
 #[test]

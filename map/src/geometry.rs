@@ -11,7 +11,7 @@ mod pose;
 pub use angle::{difference, wrap};
 pub use covariance::{Covariance, CovarianceError, mahalanobis_sq};
 pub use frame::{Level, Odom, Robot, Sensor};
-pub use hull::{convex_hull, distance_to_hull};
+pub use hull::{convex_hull, convex_hull_into, distance_to_hull};
 pub use interval::{Interval, subtract_intervals, union_intervals};
 pub(crate) use line::Axes;
 pub use line::{Line, MovedLine, UncertainLine, tangent, unit_normal};

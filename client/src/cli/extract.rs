@@ -6,10 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use mapfold_client::geojson::{PlacedFeatures, feature_collection};
 use mapfold_client::log::{Observation, carmen};
-use mapfold_client::perception::correction::CorrectionConfig;
-use mapfold_client::perception::{
-    BeamUse, Config, Corrector, Features, extract, extract_corrected, plausibility,
-};
+use mapfold_client::perception::{BeamUse, Extractor, Features};
 use mapfold_client::replay::{Competence, SensorChoice};
 use mapfold_client::sensor::Sensors;
 
@@ -43,15 +40,7 @@ impl Extract {
             emulate_sonar: false,
         };
         let scanner = choice.choose(&log)?.scanner.ok_or("there is no profile of the scanner")?;
-        let config = Config::for_scanner(&scanner);
-        let mut corrector = Corrector::for_scanner(&scanner, CorrectionConfig::STANDARD);
-        let mut features = |scan| match &mut corrector {
-            None => extract(scan, &config),
-            Some(corrector) => {
-                let states = plausibility::judge(scan, &config.plausibility);
-                extract_corrected(&corrector.correct(scan, &states), &config)
-            }
-        };
+        let mut extractor = Extractor::for_scanner(&scanner);
         let mut found: Vec<(u32, f64, _, Features)> = Vec::new();
         let mut count = 0;
         for reading in &log.readings {
@@ -59,7 +48,7 @@ impl Extract {
             let wanted = self.scan.is_none_or(|n| n == count);
             count += 1;
             if let (true, Some(pose)) = (wanted, reading.level_from_robot) {
-                found.push((reading.index, reading.time_s, pose, features(scan)));
+                found.push((reading.index, reading.time_s, pose, extractor.extract(scan).clone()));
             }
         }
         if found.is_empty() {

@@ -2,7 +2,8 @@
 //! Aldon, 2004).
 //!
 //! Two neighbours are apart if their points are farther from each other than a surface at the
-//! worst incidence `lambda` would put them: `D = r sin(dphi) / sin(lambda - dphi) + 3 s_r`. With
+//! worst incidence `lambda` would put them: `D = r sin(dphi) / sin(lambda - dphi) + 3 s_r`; as both
+//! ranges err, and a scan has a thousand pairs, we add four deviations of their difference. With
 //! beams a degree apart that is half a metre at 4 m and would jump a door frame, so beyond a cap
 //! the gap must be bridged: the points on one side lie on a line that goes through the first
 //! point of the other. (A door that stands open shows a point behind it and is no gap between
@@ -12,7 +13,6 @@ use std::ops::Range;
 
 use mapfold_map::geometry::Point;
 
-use super::fit::{FitConfig, fit_line};
 use super::points::ScanPoint;
 
 /// When neighbours are apart.
@@ -21,9 +21,16 @@ pub struct BreakpointConfig {
     /// Worst angle between beam and surface at which points still count as one surface, radians
     /// (8 to 15 degrees in the literature).
     pub worst_incidence: f64,
+    /// The same where a line bridges the gap: a wall along which one looks.
+    pub worst_incidence_of_line: f64,
+    /// Deviations of the difference of two ranges that are no gap: among a thousand neighbours, one
+    /// pair errs by four every other dozen of scans.
+    pub gap_sds: f64,
     /// Gaps up to this need no confirmation, metres: less than any door's width, more than a
     /// door frame's step.
     pub gap_cap: f64,
+    /// Wider gaps are not bridged, metres: somebody may pass through.
+    pub gap_max: f64,
     /// Points on one side whose line must bridge a wider gap, at least 3.
     pub confirming_points: usize,
     /// How many standard deviations they, and the point across, may lie off that line.
@@ -36,7 +43,10 @@ impl Default for BreakpointConfig {
     fn default() -> Self {
         Self {
             worst_incidence: 10f64.to_radians(),
+            worst_incidence_of_line: 2f64.to_radians(),
+            gap_sds: 4.0,
             gap_cap: 0.30,
+            gap_max: 0.65,
             confirming_points: 4,
             confirming_sds: 3.0,
             missing_beams: 3,
@@ -67,99 +77,171 @@ impl Ring {
     }
 }
 
-/// The points, and the runs of them that may each lie on one surface. The points of a closed scan
-/// are turned so that no run straddles their end; a run that has neither beginning nor end begins
-/// at its outermost point, which is never within a wall.
-pub fn runs(
-    mut points: Vec<ScanPoint>,
+/// What lies between a point and the next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Gap {
+    /// They may lie on one surface.
+    Near,
+    /// They may if a line bridges the gap.
+    Wide,
+    /// They may, for a line does.
+    Bridged,
+    /// They may not, for no line bridges a wide gap.
+    Open,
+    /// They may not.
+    Apart,
+}
+
+/// Finds the runs of points that may each lie on one surface. The points of a closed scan are
+/// turned so that no run straddles their end; a run that has neither beginning nor end begins
+/// at its outermost point, which is never within a wall. `gaps` is room to work in.
+pub(super) fn find_runs(
+    points: &mut [ScanPoint],
     ring: Ring,
     increment: f64,
     config: &BreakpointConfig,
-    fit: &FitConfig,
-) -> (Vec<ScanPoint>, Vec<Range<usize>>) {
+    gaps: &mut Vec<Gap>,
+    runs: &mut Vec<Range<usize>>,
+) {
+    gaps.clear();
+    runs.clear();
     let count = points.len();
     if count == 0 {
-        return (points, Vec::new());
+        return;
     }
-    let apart: Vec<bool> = (0..count)
-        .map(|i| {
-            let j = (i + 1) % count;
-            count == 1
-                || ring.steps(points[i].beam, points[j].beam).is_none_or(|steps| {
-                    steps > config.missing_beams
-                        || distance(&points, i, j)
-                            > surface_gap(&points[i], steps, increment, config)
-                })
-        })
-        .collect();
-    // `apart` now holds for gaps that no surface can explain; wide ones need confirmation.
-    let apart: Vec<bool> = (0..count)
-        .map(|i| {
-            let j = (i + 1) % count;
-            apart[i]
-                || (distance(&points, i, j) > config.gap_cap
-                    && !confirmed(&points, &apart, i, config, fit))
-        })
-        .collect();
+    let reach = Reach::new(increment, config);
+    gaps.extend(points.windows(2).map(|pair| reach.gap(&pair[0], &pair[1], ring, config)));
+    gaps.push(match count {
+        1 => Gap::Apart,
+        _ => reach.gap(&points[count - 1], &points[0], ring, config),
+    });
+    for i in 0..count {
+        if gaps[i] == Gap::Wide {
+            let bridged = is_bridged(points, gaps, i, config);
+            gaps[i] = if bridged { Gap::Bridged } else { Gap::Open };
+        }
+    }
+    let ends = |gap: &Gap| matches!(gap, Gap::Open | Gap::Apart);
     let start = if ring.closed {
-        apart.iter().rposition(|a| *a).map_or_else(|| outermost(&points), |last| (last + 1) % count)
+        gaps.iter().rposition(ends).map_or_else(|| outermost(points), |last| (last + 1) % count)
     } else {
         0
     };
-    points.rotate_left(start);
-    let mut runs = Vec::new();
+    if start > 0 {
+        points.rotate_left(start);
+        gaps.rotate_left(start);
+    }
     let mut from = 0;
-    for i in 0..count {
-        if apart[(start + i) % count] || i + 1 == count {
+    for (i, gap) in gaps.iter().enumerate() {
+        if ends(gap) || i + 1 == count {
             runs.push(from..i + 1);
             from = i + 1;
         }
     }
-    (points, runs)
 }
 
-fn distance(points: &[ScanPoint], i: usize, j: usize) -> f64 {
-    (points[j].at - points[i].at).norm()
+/// How far apart the points of one surface can be from one beam to the next.
+struct Reach {
+    increment: f64,
+    /// Growth with range, for neighbours.
+    surface: f64,
+    /// The same where a line bridges the gap.
+    line: f64,
 }
 
-/// How far apart the points of one surface can be, `steps` beams on.
-fn surface_gap(a: &ScanPoint, steps: usize, increment: f64, config: &BreakpointConfig) -> f64 {
-    let turn = increment * steps as f64;
-    let noise = 3.0 * a.variance_along.sqrt();
-    if turn >= config.worst_incidence {
-        return config.gap_cap + noise;
+impl Reach {
+    fn new(increment: f64, config: &BreakpointConfig) -> Self {
+        Self {
+            increment,
+            surface: growth(increment, config.worst_incidence),
+            line: growth(increment, config.worst_incidence_of_line),
+        }
     }
-    a.range * turn.sin() / (config.worst_incidence - turn).sin() + noise
+
+    fn gap(&self, a: &ScanPoint, b: &ScanPoint, ring: Ring, config: &BreakpointConfig) -> Gap {
+        let distance_sq = (b.at - a.at).norm_squared();
+        let near = (self.surface * a.range).min(config.gap_cap);
+        // Most neighbours are so close that nothing else need be asked.
+        if b.beam == a.beam + 1 && distance_sq <= near * near {
+            return Gap::Near;
+        }
+        self.wider_gap(a, b, distance_sq, ring, config)
+    }
+
+    #[cold]
+    fn wider_gap(
+        &self,
+        a: &ScanPoint,
+        b: &ScanPoint,
+        distance_sq: f64,
+        ring: Ring,
+        config: &BreakpointConfig,
+    ) -> Gap {
+        let Some(steps) = ring.steps(a.beam, b.beam).filter(|s| *s <= config.missing_beams) else {
+            return Gap::Apart;
+        };
+        let (surface, line) = if steps == 1 {
+            (self.surface, self.line)
+        } else {
+            let turn = self.increment * steps as f64;
+            let of = |worst| growth(turn, worst);
+            (of(config.worst_incidence), of(config.worst_incidence_of_line))
+        };
+        // Both ranges err.
+        let noise = config.gap_sds * (a.variance_along + b.variance_along).sqrt();
+        let within = |growth: f64| {
+            // Beams as far apart as the worst incidence tell nothing.
+            let reach = if growth.is_finite() { growth * a.range } else { config.gap_cap };
+            distance_sq <= (reach + noise).powi(2)
+        };
+        if within(surface) && distance_sq <= config.gap_cap * config.gap_cap {
+            Gap::Near
+        } else if distance_sq <= config.gap_max * config.gap_max && within(line) {
+            Gap::Wide
+        } else {
+            Gap::Apart
+        }
+    }
+}
+
+/// Distance over range of two points on a surface at the worst incidence, `turn` apart.
+fn growth(turn: f64, worst_incidence: f64) -> f64 {
+    if turn < worst_incidence { turn.sin() / (worst_incidence - turn).sin() } else { f64::INFINITY }
 }
 
 /// Whether the gap after point `i` is bridged by a line: several points on one side of it, none
 /// apart from its neighbour, lie on a line on which the first point of the other side lies too.
-fn confirmed(
-    points: &[ScanPoint],
-    apart: &[bool],
-    i: usize,
-    config: &BreakpointConfig,
-    fit: &FitConfig,
-) -> bool {
+fn is_bridged(points: &[ScanPoint], gaps: &[Gap], i: usize, config: &BreakpointConfig) -> bool {
     let (count, k) = (points.len(), config.confirming_points);
     if k >= count {
         return false;
     }
-    // The k points from `first` on, in order, and the point across the gap.
-    let agrees = |first: usize, across: usize| {
+    let limit = config.confirming_sds * config.confirming_sds;
+    // The k points from `first` on, in order; the nearer of their ends; and the point across.
+    let agrees = |first: usize, near: usize, across: usize| {
         let at = |offset: usize| (first + offset) % count;
-        if (0..k - 1).any(|offset| apart[at(offset)]) {
+        if (0..k - 1).any(|offset| gaps[at(offset)] == Gap::Apart) {
             return false;
         }
-        let side = (0..k).map(|offset| &points[at(offset)]);
-        fit_line(side, fit).is_ok_and(|line| {
-            let point = &points[across];
-            let variance = point.variance(&line.normal) + line.variance_at(&point.at);
-            line.worst <= config.confirming_sds
-                && line.residual(&point.at).abs() <= config.confirming_sds * variance.sqrt()
-        })
+        let far = if near == first { at(k - 1) } else { first };
+        let (far, near, across) = (&points[far], &points[near], &points[across]);
+        let chord = near.at - far.at;
+        let length = chord.norm();
+        let n = Point::new(-chord.y, chord.x) / length;
+        let (near_variance, far_variance) = (near.variance(&n), far.variance(&n));
+        // Off the chord, whose ends err too: at `share` of its length beyond its far end.
+        let off = |point: &ScanPoint| {
+            let d = point.at - far.at;
+            let share = d.dot(&chord) / (length * length);
+            let variance = point.variance(&n)
+                + share * share * near_variance
+                + (1.0 - share).powi(2) * far_variance;
+            n.dot(&d).powi(2) <= limit * variance
+        };
+        length > 0.0 && off(across) && (1..k - 1).all(|offset| off(&points[at(offset)]))
     };
-    agrees((i + count + 1 - k) % count, (i + 1) % count) || agrees((i + 1) % count, i)
+    let (before, after) = ((i + count + 1 - k) % count, (i + 1) % count);
+    agrees(before, i, after) || agrees(after, after, i)
 }
 
 /// The point farthest from the mean of all: a corner of their convex hull.
@@ -198,24 +280,25 @@ mod tests {
 
     fn runs_of(ranges: &[Option<f64>], closed: bool) -> (Vec<ScanPoint>, Vec<Range<usize>>) {
         let ring = Ring { closed, beams: ranges.len() };
-        let fit = FitConfig { systematic_sd: 0.01, linearity_min: 0.9 };
-        runs(points_of(ranges), ring, 1f64.to_radians(), &BreakpointConfig::default(), &fit)
+        runs_in(points_of(ranges), ring)
+    }
+
+    fn runs_in(mut points: Vec<ScanPoint>, ring: Ring) -> (Vec<ScanPoint>, Vec<Range<usize>>) {
+        let (mut gaps, mut runs) = (Vec::new(), Vec::new());
+        let config = BreakpointConfig::default();
+        find_runs(&mut points, ring, 1f64.to_radians(), &config, &mut gaps, &mut runs);
+        (points, runs)
+    }
+
+    fn distance(points: &[ScanPoint], i: usize, j: usize) -> f64 {
+        (points[j].at - points[i].at).norm()
     }
 
     #[test]
     fn the_law_of_sines_gives_the_published_distances() {
         let at = |r, degrees: f64, lambda: f64| {
-            let config = BreakpointConfig {
-                worst_incidence: lambda.to_radians(),
-                ..BreakpointConfig::default()
-            };
-            let p = ScanPoint::new(
-                0,
-                r,
-                Point::new(1.0, 0.0),
-                &NoiseConfig { range_sd: 0.02, range_sd_per_metre: 0.0, bearing_sd: 0.0 },
-            );
-            surface_gap(&p, 1, degrees.to_radians(), &config)
+            // What is published adds three deviations of the range, here of 2 cm.
+            r * growth(degrees.to_radians(), lambda.to_radians()) + 0.06
         };
         assert!((at(4.0, 1.0, 10.0) - 0.506).abs() < 1e-3);
         assert!((at(4.0, 1.0, 15.0) - 0.349).abs() < 1e-3);
@@ -248,10 +331,8 @@ mod tests {
             })
             .collect();
         assert!(distance(&wall, 0, 1) > 0.6 && distance(&wall, 4, 5) > 0.3);
-        let fit = FitConfig { systematic_sd: 0.01, linearity_min: 0.9 };
         let ring = Ring { closed: false, beams: 8 };
-        let config = BreakpointConfig::default();
-        assert_eq!(runs(wall, ring, 1f64.to_radians(), &config, &fit).1.first(), Some(&(0..8)));
+        assert_eq!(runs_in(wall, ring).1.first(), Some(&(0..8)));
         // The same gap, but the points behind it lie on another surface.
         let mut step: Vec<_> = vec![Some(4.0); 8];
         step.extend(vec![Some(4.4); 8]);

@@ -6,7 +6,8 @@
 
 use std::ops::Range;
 
-use mapfold_map::geometry::{Covariance, Point, convex_hull, distance_to_hull};
+use mapfold_map::geometry::{Covariance, Point, convex_hull_into, distance_to_hull};
+use nalgebra::Matrix2;
 
 use super::points::ScanPoint;
 use crate::sensor::ScannerProfile;
@@ -41,44 +42,49 @@ impl ClusterConfig {
 
 /// A cluster in the sensor frame.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FoundCluster {
-    /// Indices of its points, ascending.
-    pub members: Vec<usize>,
+pub(super) struct FoundCluster {
     /// Convex hull, counter-clockwise.
-    pub hull: Vec<Point>,
-    /// Mean of the points.
-    pub centroid: Point,
-    /// Covariance of the mean.
-    pub covariance: Covariance<2>,
-}
-
-/// A stretch of points that may join others.
-struct Group {
-    members: Vec<usize>,
-    hull: Vec<Point>,
+    pub(super) hull: Vec<Point>,
+    /// Corners of the box around it.
     min: Point,
     max: Point,
+    /// Number of points.
+    pub(super) count: usize,
+    /// Sum of the points.
+    sum: Point,
+    /// Sum of their covariances: xx, xy, yy.
+    variances: [f64; 3],
+    /// Sum of the variances that neighbours share.
+    shared: f64,
 }
 
-impl Group {
-    fn new(points: &[ScanPoint], members: Vec<usize>) -> Self {
-        let at: Vec<Point> = members.iter().map(|&i| points[i].at).collect();
-        let (mut min, mut max) = (at[0], at[0]);
-        for p in &at {
-            min = min.inf(p);
-            max = max.sup(p);
-        }
-        Self { hull: convex_hull(&at), members, min, max }
+impl FoundCluster {
+    /// Mean of the points.
+    pub(super) fn centroid(&self) -> Point {
+        self.sum / self.count as f64
     }
 
-    fn extent(&self) -> f64 {
-        let mut longest: f64 = 0.0;
-        for (i, a) in self.hull.iter().enumerate() {
-            for b in &self.hull[i + 1..] {
-                longest = longest.max((b - a).norm());
-            }
+    /// Covariance of the mean: more points do not average out what all beams share.
+    pub(super) fn covariance(&self, config: &ClusterConfig) -> Covariance<2> {
+        let share = 1.0 / (self.count as f64 * self.count as f64);
+        let [xx, xy, yy] = self.variances;
+        let floor = config.systematic_sd * config.systematic_sd + self.shared / self.count as f64;
+        let own = Covariance::new(Matrix2::new(xx, xy, xy, yy)).unwrap_or_else(|_not_finite| {
+            // Points without a finite variance have no finite mean either.
+            Covariance::zero()
+        });
+        own.scaled(share) + Covariance::from_variances([floor; 2])
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.min = self.min.inf(&other.min);
+        self.max = self.max.sup(&other.max);
+        self.count += other.count;
+        self.sum += other.sum;
+        self.shared += other.shared;
+        for (own, more) in self.variances.iter_mut().zip(other.variances) {
+            *own += more;
         }
-        longest
     }
 
     fn is_near(&self, other: &Self, distance: f64) -> bool {
@@ -92,79 +98,146 @@ impl Group {
     }
 }
 
-/// Gathers the stretches of points that no line took into clusters.
-pub fn clusters(
-    points: &[ScanPoint],
-    loose: &[Range<usize>],
-    config: &ClusterConfig,
-) -> Vec<FoundCluster> {
-    let mut groups: Vec<Group> = Vec::new();
-    for stretch in loose {
-        let mut waiting = vec![stretch.clone().collect::<Vec<_>>()];
-        while let Some(mut members) = waiting.pop() {
-            let group = Group::new(points, members.clone());
-            let fits =
-                group.extent() <= config.extent_max && group.hull.len() <= config.hull_points_max;
-            if fits || members.len() < 2 {
-                groups.push(group);
-            } else {
-                let right = members.split_off(best_cut(points, &members));
-                waiting.push(right);
-                waiting.push(members);
+/// A stretch of points and the cluster that it went into.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Part {
+    /// The points.
+    pub(super) points: Range<usize>,
+    /// Index of the cluster.
+    pub(super) cluster: usize,
+}
+
+/// Gathers clusters; what it allocates it uses again.
+#[derive(Debug, Default)]
+pub(super) struct Gatherer {
+    /// The clusters, those with too few points among them.
+    pub(super) found: Vec<FoundCluster>,
+    /// What they are made of.
+    pub(super) parts: Vec<Part>,
+    waiting: Vec<Range<usize>>,
+    corners: Vec<Point>,
+    hull: Vec<Point>,
+    /// Hulls that are no longer needed.
+    spare: Vec<Vec<Point>>,
+}
+
+impl Gatherer {
+    /// Takes back a hull that was given away.
+    pub(super) fn recycle(&mut self, hull: Vec<Point>) {
+        self.spare.push(hull);
+    }
+
+    /// Gathers the stretches of points that no line took into clusters.
+    pub(super) fn gather(
+        &mut self,
+        points: &[ScanPoint],
+        loose: &[Range<usize>],
+        config: &ClusterConfig,
+    ) {
+        // Hulls that were given away come back by themselves.
+        let left = self.found.drain(..).map(|cluster| cluster.hull).filter(|h| h.capacity() > 0);
+        self.spare.extend(left);
+        self.parts.clear();
+        for stretch in loose {
+            self.waiting.push(stretch.clone());
+            while let Some(range) = self.waiting.pop() {
+                if let Some(cluster) = self.whole(points, &range, config) {
+                    self.join(range, cluster, config);
+                } else {
+                    let cut = best_cut(points, &range);
+                    self.waiting.push(cut..range.end);
+                    self.waiting.push(range.start..cut);
+                }
             }
         }
     }
-    // Each group joins the first earlier one that is near enough and stays small enough with it.
-    let mut joined: Vec<Group> = Vec::new();
-    for group in groups {
-        let union = joined.iter().enumerate().find_map(|(i, other)| {
-            if !other.is_near(&group, config.join_distance) {
-                return None;
-            }
-            let members = other.members.iter().chain(&group.members).copied().collect();
-            let union = Group::new(points, members);
-            (union.extent() <= config.extent_max && union.hull.len() <= config.hull_points_max)
-                .then_some((i, union))
-        });
-        match union {
-            Some((i, union)) => joined[i] = union,
-            None => joined.push(group),
+
+    /// A stretch as one cluster, unless it is too large for that.
+    fn whole(
+        &mut self,
+        points: &[ScanPoint],
+        range: &Range<usize>,
+        config: &ClusterConfig,
+    ) -> Option<FoundCluster> {
+        let first = points[range.start].at;
+        let (mut min, mut max, mut sum) = (first, first, Point::zeros());
+        let (mut variances, mut shared) = ([0.0; 3], 0.0);
+        for point in &points[range.clone()] {
+            min = min.inf(&point.at);
+            max = max.sup(&point.at);
+            sum += point.at;
+            let (xx, xy, yy) = point.entries();
+            shared += point.variance_shared;
+            variances = [variances[0] + xx, variances[1] + xy, variances[2] + yy];
         }
+        let several = range.len() > 1;
+        if several && (max - min).max() > config.extent_max {
+            return None;
+        }
+        self.corners.clear();
+        self.corners.extend(points[range.clone()].iter().map(|p| p.at));
+        let hull = self.hull_of_corners(config, several)?;
+        Some(FoundCluster { hull, min, max, count: range.len(), sum, variances, shared })
     }
-    joined
-        .into_iter()
-        .filter(|g| g.members.len() >= config.points_min)
-        .map(|g| describe(points, g, config))
-        .collect()
+
+    /// The hull of the points in `corners`, unless it must be small and is not.
+    fn hull_of_corners(&mut self, config: &ClusterConfig, small: bool) -> Option<Vec<Point>> {
+        convex_hull_into(&mut self.corners, &mut self.hull);
+        if small && !is_small(&self.hull, config) {
+            return None;
+        }
+        let room = || Vec::with_capacity(config.hull_points_max);
+        let mut hull = self.spare.pop().unwrap_or_else(room);
+        hull.clear();
+        hull.extend_from_slice(&self.hull);
+        Some(hull)
+    }
+
+    /// Joins a cluster to the first that is near enough and stays small enough with it.
+    fn join(&mut self, points: Range<usize>, cluster: FoundCluster, config: &ClusterConfig) {
+        for at in 0..self.found.len() {
+            let other = &self.found[at];
+            let extent = (other.max.sup(&cluster.max) - other.min.inf(&cluster.min)).max();
+            if extent > config.extent_max || !other.is_near(&cluster, config.join_distance) {
+                continue;
+            }
+            self.corners.clear();
+            self.corners.extend(other.hull.iter().chain(&cluster.hull));
+            if let Some(hull) = self.hull_of_corners(config, true) {
+                let other = &mut self.found[at];
+                self.spare.push(std::mem::replace(&mut other.hull, hull));
+                other.add(&cluster);
+                self.spare.push(cluster.hull);
+                self.parts.push(Part { points, cluster: at });
+                return;
+            }
+        }
+        self.parts.push(Part { points, cluster: self.found.len() });
+        self.found.push(cluster);
+    }
+}
+
+fn is_small(hull: &[Point], config: &ClusterConfig) -> bool {
+    let limit = config.extent_max * config.extent_max;
+    hull.len() <= config.hull_points_max
+        && hull
+            .iter()
+            .enumerate()
+            .all(|(i, a)| hull[i + 1..].iter().all(|b| (b - a).norm_squared() <= limit))
 }
 
 /// Where to cut: before a point that is far from its predecessor, and not too near either end.
-fn best_cut(points: &[ScanPoint], members: &[usize]) -> usize {
-    let mut best = (1, f64::NEG_INFINITY);
-    for (i, pair) in members.windows(2).enumerate() {
-        let gap = (points[pair[1]].at - points[pair[0]].at).norm();
-        let smaller = (i + 1).min(members.len() - i - 1);
+fn best_cut(points: &[ScanPoint], range: &Range<usize>) -> usize {
+    let mut best = (range.start + 1, f64::NEG_INFINITY);
+    for cut in range.start + 1..range.end {
+        let gap = (points[cut].at - points[cut - 1].at).norm();
+        let smaller = (cut - range.start).min(range.end - cut);
         let score = gap * smaller as f64;
         if score > best.1 {
-            best = (i + 1, score);
+            best = (cut, score);
         }
     }
     best.0
-}
-
-fn describe(points: &[ScanPoint], group: Group, config: &ClusterConfig) -> FoundCluster {
-    let count = group.members.len() as f64;
-    let mean = group.members.iter().map(|&i| points[i].at).sum::<Point>() / count;
-    let shared = group.members.iter().map(|&i| points[i].variance_shared).sum::<f64>() / count;
-    let floor = config.systematic_sd.powi(2) + shared;
-    let summed =
-        group.members.iter().fold(Covariance::zero(), |sum, &i| sum + points[i].covariance());
-    FoundCluster {
-        covariance: summed.scaled(1.0 / (count * count)) + Covariance::from_variances([floor; 2]),
-        centroid: mean,
-        hull: group.hull,
-        members: group.members,
-    }
 }
 
 #[cfg(test)]
@@ -192,6 +265,14 @@ mod tests {
             .collect()
     }
 
+    /// The cluster of each stretch.
+    fn gathered(points: &[ScanPoint], loose: &[Range<usize>]) -> Vec<usize> {
+        let mut gatherer = Gatherer::default();
+        gatherer.gather(points, loose, &CONFIG);
+        assert_eq!(gatherer.parts.len(), loose.len());
+        gatherer.parts.iter().map(|part| part.cluster).collect()
+    }
+
     #[test]
     fn near_stretches_join_and_far_ones_do_not() {
         let points = points_at(&[
@@ -205,9 +286,7 @@ mod tests {
             (3.0, 1.1), // far away
             (5.0, 0.0), // alone
         ]);
-        let found = clusters(&points, &[0..3, 3..5, 5..8, 8..9], &CONFIG);
-        let members: Vec<_> = found.iter().map(|c| c.members.clone()).collect();
-        assert_eq!(members, [vec![0, 1, 2, 3, 4], vec![5, 6, 7]]);
+        assert_eq!(gathered(&points, &[0..3, 3..5, 5..8, 8..9]), [0, 0, 1, 2]);
     }
 
     #[test]
@@ -220,15 +299,18 @@ mod tests {
             (2.0, 0.95),
             (2.05, 1.15),
         ]);
-        let found = clusters(&points, std::slice::from_ref(&(0..6)), &CONFIG);
-        let members: Vec<_> = found.iter().map(|c| c.members.clone()).collect();
-        assert_eq!(members, [vec![0, 1, 2], vec![3, 4, 5]]);
+        let mut gatherer = Gatherer::default();
+        gatherer.gather(&points, std::slice::from_ref(&(0..6)), &CONFIG);
+        let parts = [Part { points: 0..3, cluster: 0 }, Part { points: 3..6, cluster: 1 }];
+        assert_eq!(gatherer.parts, parts);
     }
 
     #[test]
     fn the_mean_of_many_points_keeps_the_shared_error() {
         let points = points_at(&[(2.0, 0.0); 3]);
-        let c = describe(&points, Group::new(&points, vec![0, 1, 2]), &CONFIG).covariance;
+        let mut gatherer = Gatherer::default();
+        gatherer.gather(&points, std::slice::from_ref(&(0..3)), &CONFIG);
+        let c = gatherer.found[0].covariance(&CONFIG);
         assert!((c.matrix()[(0, 0)] - (4e-4 / 3.0 + 1e-4)).abs() < 1e-12);
     }
 }

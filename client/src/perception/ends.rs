@@ -1,21 +1,21 @@
 //! Where a wall ends, and what that end is.
 //!
 //! A *corner* is where the neighbouring wall of the same run meets it: the end is the
-//! intersection. At a *jump* the view goes on behind: the wall ends somewhere between its last
-//! point and where the next beam would have met it, so the end is taken half-way and is uncertain
-//! by that spacing over the square root of 12. Everything else is *occluded*: something stands in
-//! front, the scan ends, nothing came back, or clutter adjoins. There only the last point is
-//! known, and the wall may go on.
+//! intersection. At a *jump* the view goes on behind, be it past a stray reading or two: the wall
+//! ends somewhere between its last point and where the next beam would have met it, so the end is
+//! taken half-way and is uncertain by that spacing over the square root of 12. Everything else is
+//! *occluded*: something stands in front, the scan ends, nothing came back, or clutter adjoins. There
+//! only the last point is known, and the wall may go on.
 
 use std::ops::Range;
 
+use mapfold_map::geometry::Point;
 use mapfold_map::vector::{EndKind, ObservedEnd};
 
 use super::breakpoints::Ring;
 use super::fit::LineFit;
 use super::points::ScanPoint;
 use super::split::FoundLine;
-use crate::sensor::Scan;
 
 /// What the ends of a wall are.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,7 +25,8 @@ pub struct EndsConfig {
     /// Farthest that the intersection may lie from the walls' last points, metres, before three
     /// standard deviations are added.
     pub corner_reach: f64,
-    /// Points of neither wall that may lie between them at a corner.
+    /// Points of neither wall that may lie between them at a corner, and off a wall between its last
+    /// point and the first beam that goes on behind it: readings at edges are mixed.
     pub corner_strays: usize,
     /// Longest stretch between the last point and the next beam's at which an end still counts as
     /// seen, metres.
@@ -55,13 +56,13 @@ impl Default for EndsConfig {
 
 /// A line with its ends, along its own tangent from the foot point of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ended {
+pub(super) struct Ended {
     /// Coordinate of the lower end, metres.
-    pub from: f64,
+    pub(super) from: f64,
     /// Coordinate of the upper end, metres.
-    pub to: f64,
+    pub(super) to: f64,
     /// The lower and the upper end.
-    pub ends: [ObservedEnd; 2],
+    pub(super) ends: [ObservedEnd; 2],
 }
 
 /// The side of a line towards lower or higher bearings: along its tangent, bearings grow.
@@ -71,60 +72,58 @@ enum Side {
     Upper,
 }
 
-/// The ends of every line; `None` for a line that its corners leave too short.
-pub fn segments(
-    points: &[ScanPoint],
-    runs: &[Range<usize>],
-    lines: &[FoundLine],
-    ring: Ring,
-    scan: &Scan,
-    config: &EndsConfig,
-) -> Vec<Option<Ended>> {
-    let run_of = |line: &FoundLine| {
-        runs.iter().find(|r| r.contains(&line.first())).cloned().unwrap_or_default()
-    };
-    // A room seen all round in one run has no first wall: its last one comes before it.
-    let endless = ring.closed && runs.len() == 1 && lines.len() > 1;
-    (0..lines.len())
-        .map(|i| {
-            let line = &lines[i];
-            let run = run_of(line);
-            let neighbour = |at: Option<usize>, round: usize| {
-                let at = at.filter(|at| *at < lines.len()).or(endless.then_some(round));
-                at.map(|at| &lines[at]).filter(|n| run.contains(&n.first()))
-            };
-            let before = neighbour(i.checked_sub(1), lines.len() - 1);
-            let after = neighbour(Some(i + 1), 0);
-            let view = View { points, run, ring, scan, config };
-            let (from, lower) = view.end(line, before, Side::Lower);
-            let (to, upper) = view.end(line, after, Side::Upper);
-            (to - from >= config.length_min).then_some(Ended { from, to, ends: [lower, upper] })
-        })
-        .collect()
-}
-
-/// What surrounds a line.
-struct View<'a> {
-    points: &'a [ScanPoint],
-    run: Range<usize>,
-    ring: Ring,
-    scan: &'a Scan,
-    config: &'a EndsConfig,
+/// What surrounds a scan's lines.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct View<'a> {
+    /// All points.
+    pub(super) points: &'a [ScanPoint],
+    /// Where the beams point.
+    pub(super) directions: &'a [Point],
+    /// The runs that the points fall into, ascending.
+    pub(super) runs: &'a [Range<usize>],
+    /// How the beams follow each other.
+    pub(super) ring: Ring,
+    /// The settings.
+    pub(super) config: &'a EndsConfig,
 }
 
 impl View<'_> {
-    fn end(&self, line: &FoundLine, next: Option<&FoundLine>, side: Side) -> (f64, ObservedEnd) {
+    /// The ends of line `i`; `None` if its corners leave too little of it.
+    pub(super) fn ends(&self, lines: &[FoundLine], i: usize) -> Option<Ended> {
+        let line = &lines[i];
+        let after = self.runs.partition_point(|run| run.end <= line.first());
+        let run = self.runs.get(after)?;
+        // A room seen all round in one run has no first wall: its last one comes before it.
+        let endless = self.ring.closed && self.runs.len() == 1 && lines.len() > 1;
+        let neighbour = |at: Option<usize>, round: usize| {
+            let at = at.filter(|at| *at < lines.len()).or(endless.then_some(round));
+            at.map(|at| &lines[at]).filter(|n| run.contains(&n.first()))
+        };
+        let before = neighbour(i.checked_sub(1), lines.len() - 1);
+        let after = neighbour(Some(i + 1), 0);
+        let (from, lower) = self.end(line, run, before, Side::Lower);
+        let (to, upper) = self.end(line, run, after, Side::Upper);
+        (to - from >= self.config.length_min).then_some(Ended { from, to, ends: [lower, upper] })
+    }
+
+    fn end(
+        &self,
+        line: &FoundLine,
+        run: &Range<usize>,
+        next: Option<&FoundLine>,
+        side: Side,
+    ) -> (f64, ObservedEnd) {
         let fit = &line.fit;
-        let (last, t_last) = match side {
-            Side::Lower => (line.first(), fit.span.0),
-            Side::Upper => (line.last(), fit.span.1),
+        let (last, t_last, strays) = match side {
+            Side::Lower => (line.first(), fit.span.0, line.first() - run.start),
+            Side::Upper => (line.last(), fit.span.1, run.end - line.last() - 1),
         };
         if let Some((t, sd)) = next.and_then(|next| self.corner(line, next, side)) {
             return (t, ObservedEnd { kind: EndKind::Corner, sd });
         }
         let point = &self.points[last];
         let hit_variance = point.variance(&fit.tangent);
-        if let Some(spacing) = self.jump(fit, last, t_last, side) {
+        if let Some(spacing) = self.jump(fit, (last, strays), t_last, side) {
             let half = match side {
                 Side::Lower => -0.5 * spacing,
                 Side::Upper => 0.5 * spacing,
@@ -160,31 +159,36 @@ impl View<'_> {
         meets.then(|| (t, variance.sqrt()))
     }
 
-    /// How far apart along the wall its last point and the first beam past it are, if that beam
-    /// went on behind.
-    fn jump(&self, fit: &LineFit, last: usize, t_last: f64, side: Side) -> Option<f64> {
-        let at_run_end = match side {
-            Side::Lower => last == self.run.start,
-            Side::Upper => last + 1 == self.run.end,
-        };
-        if !at_run_end {
+    /// How far apart along the wall its last point and the first beam past it and past the strays of
+    /// its run are, if that beam went on behind.
+    fn jump(
+        &self,
+        fit: &LineFit,
+        (last, strays): (usize, usize),
+        t_last: f64,
+        side: Side,
+    ) -> Option<f64> {
+        if strays > self.config.corner_strays {
             return None;
         }
-        let count = self.points.len();
+        let (count, away) = (self.points.len(), strays + 1);
+        if away >= count {
+            return None;
+        }
         let next = match side {
-            Side::Lower => &self.points[(last + count - 1) % count],
-            Side::Upper => &self.points[(last + 1) % count],
+            Side::Lower => &self.points[(last + count - away) % count],
+            Side::Upper => &self.points[(last + away) % count],
         };
         let here = &self.points[last];
         let steps = match side {
             Side::Lower => self.ring.steps(next.beam, here.beam),
             Side::Upper => self.ring.steps(here.beam, next.beam),
         }?;
-        if steps > self.config.missing_beams {
+        if steps > self.config.missing_beams + strays {
             return None;
         }
         // Where the next beam would have met this wall.
-        let direction = self.scan.direction(next.beam);
+        let direction = self.directions[next.beam];
         let towards = fit.normal.dot(&direction);
         if towards <= 0.0 {
             return None;
@@ -220,7 +224,7 @@ mod tests {
     use super::*;
     use crate::perception::fit::{FitConfig, fit_line};
     use crate::perception::points::{NoiseConfig, ScanPoint};
-    use mapfold_map::geometry::{Point, tangent, unit_normal};
+    use mapfold_map::geometry::{tangent, unit_normal};
 
     const NOISE: NoiseConfig =
         NoiseConfig { range_sd: 0.02, range_sd_per_metre: 0.0, bearing_sd: 0.002 };
@@ -233,7 +237,11 @@ mod tests {
                 ScanPoint::new(i as usize, p.norm(), p / p.norm(), &NOISE)
             })
             .collect();
-        fit_line(points.iter(), &FitConfig { systematic_sd: 0.005, linearity_min: 0.9 }).unwrap()
+        fit_line(
+            points.iter(),
+            &FitConfig { systematic_sd: 0.005, linearity_min: 0.9, choice_factor: 1.0 },
+        )
+        .unwrap()
     }
 
     #[test]

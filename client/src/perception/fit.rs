@@ -1,23 +1,25 @@
 //! Weighted total least squares: the line of a set of points, with its covariance.
 //!
 //! Closed form for given weights (`N = -2 S_xy`, `D = S_yy - S_xx`, `alpha = atan2(N, D) / 2`,
-//! `rho = n . c`), two passes: the first weighs every point by its range variance, the second by
-//! its variance across the line found. The covariance sums the points' own covariances through
-//! the Jacobians of the closed form,
+//! `rho = n . c`): a first pass weighs every point by its range variance and needs sums only, which
+//! for a stretch of a scan are differences of running sums and cost nothing ([`super::guess`]); the
+//! next weigh it by its variance across the line found, until that no longer turns. The covariance
+//! sums the points' own covariances through the Jacobians of the closed form,
 //!
 //! ```text
 //! d alpha / dp_i = -(w_i / Lambda) (t_i n + e_i u),   Lambda = sqrt(N^2 + D^2)
 //! d rho   / dp_i =  (w_i / W) n + (u . c) d alpha / dp_i
 //! ```
 //!
-//! and adds a floor for what all beams on one surface have in common and more beams do not
-//! average out. Only vector forms: projections through `1 / tan(alpha)` have no place here.
+//! which for weights `1 / (n^T C_i n)` and residuals `e_i` that are small against the coordinates
+//! `t_i` along the line is `1 / S_tt` and `1 / W` about the centre. A floor is added for what all
+//! beams on one surface have in common and more beams do not average out. Only vector forms:
+//! projections through `1 / tan(alpha)` have no place here.
 
-use std::f64::consts::PI;
-
-use mapfold_map::geometry::{Covariance, Point, Sensor, UncertainLine, tangent, unit_normal};
+use mapfold_map::geometry::{Covariance, Point, Sensor, UncertainLine};
 use nalgebra::Matrix2;
 
+use super::guess::{Guess, Sums};
 use super::points::ScanPoint;
 use crate::sensor::ScannerProfile;
 
@@ -28,12 +30,16 @@ pub struct FitConfig {
     pub systematic_sd: f64,
     /// Smallest `Lambda / (S_xx + S_yy)` of a line: below, the points are a blob.
     pub linearity_min: f64,
+    /// By how much more than their noise alone makes it a line's variances are, for its points were
+    /// chosen by the very errors that they have: those of a corner or a door frame that happen to
+    /// lie on it are taken for its own. 1.15 keeps lines in simulated offices honest at any noise.
+    pub choice_factor: f64,
 }
 
 impl FitConfig {
     /// The settings that follow from a scanner's profile.
     pub fn for_scanner(profile: &ScannerProfile) -> Self {
-        Self { systematic_sd: profile.systematic_sd_m, linearity_min: 0.9 }
+        Self { systematic_sd: profile.systematic_sd_m, linearity_min: 0.8, choice_factor: 1.15 }
     }
 }
 
@@ -61,21 +67,20 @@ pub struct LineFit {
     pub count: usize,
     /// Sum of the squared residuals, each over its variance across the line.
     pub chi_sq: f64,
-    /// Largest residual over its standard deviation.
-    pub worst: f64,
-    /// Least and greatest coordinate of the points along the line.
+    /// Coordinates of the first and the last point along the line, the lesser first.
     pub span: (f64, f64),
+    /// Sum of the points' weights, `1 / (n^T C n)`.
+    weight: f64,
+    /// Second moment along the line about the middle, with these weights.
+    along: f64,
+    /// Coordinate of the middle along the line.
+    middle: f64,
 }
 
 impl LineFit {
     /// Signed distance of `p` from the line, away from the sensor.
     pub fn residual(&self, p: &Point) -> f64 {
         self.normal.dot(p) - self.line.line.rho()
-    }
-
-    /// Residual over the standard deviation of the point across the line.
-    pub fn normalised(&self, point: &ScanPoint) -> f64 {
-        self.residual(&point.at).abs() / point.variance(&self.normal).sqrt()
     }
 
     /// Variance of the line's place across itself at the foot point of `p`.
@@ -85,56 +90,67 @@ impl LineFit {
         (c[(0, 0)] - 2.0 * t * c[(0, 1)] + t * t * c[(1, 1)]).max(0.0)
     }
 
+    /// The same line with the span of all of a wall's points, which need not all have been fitted.
+    pub(super) fn spanning(self, first: &Point, last: &Point) -> Self {
+        let (a, b) = (self.tangent.dot(first), self.tangent.dot(last));
+        Self { span: (a.min(b), a.max(b)), ..self }
+    }
+
     /// Length of wall that the points cover.
     pub fn length(&self) -> f64 {
         self.span.1 - self.span.0
     }
 
+    /// Weight of a point, where its beam meets the line, from the middle of the line, and how far off
+    /// it ended.
+    fn local(&self, point: &ScanPoint) -> (f64, f64, f64) {
+        let d = point.at - self.tangent * self.middle;
+        let e = self.normal.dot(&d) - self.line.line.rho();
+        let (w, slip) = weight_and_slip(point, &self.normal, &self.tangent);
+        (w, self.tangent.dot(&d) - e * slip, e)
+    }
+
+    /// How many of these points, the outermost of one end in their order inwards, stand together
+    /// off the line: the largest number whose summed residuals are more than `sds` deviations from
+    /// nothing. Each alone may lie well within its own noise. The sum of `m` weighted residuals has the
+    /// variance `W_m - W_m^2 / W - T_m^2 / S_tt`, for the line has followed them as far as it could.
+    pub(super) fn astray<'a>(&self, end: impl Iterator<Item = &'a ScanPoint>, sds: f64) -> usize {
+        let (mut weight, mut along, mut sum) = (0.0, 0.0, 0.0);
+        let (mut worst, mut astray) = (sds * sds, 0);
+        for (i, point) in end.enumerate() {
+            let (w, t, e) = self.local(point);
+            weight += w;
+            along += w * t;
+            sum += w * e;
+            let variance = weight - weight * weight / self.weight - along * along / self.along;
+            if sum * sum > worst * variance && variance > 0.0 {
+                worst = sum * sum / variance;
+                astray = i + 1;
+            }
+        }
+        astray
+    }
+
+    /// How far these points bow off the line between their ends, and the standard deviation of
+    /// that, metres: the regression of their residuals on what is left of `t^2` when the
+    /// line has taken its part.
+    pub(super) fn bow<'a>(&self, points: impl Iterator<Item = &'a ScanPoint>) -> (f64, f64) {
+        let (mut ttt, mut tttt, mut tte) = (0.0, 0.0, 0.0);
+        for point in points {
+            let (w, t, e) = self.local(point);
+            let tt = t * t;
+            ttt += w * tt * t;
+            tttt += w * tt * tt;
+            tte += w * tt * e;
+        }
+        let left = tttt - self.along * self.along / self.weight - ttt * ttt / self.along;
+        let quarter = 0.25 * self.length() * self.length();
+        (quarter * (tte / left).abs(), quarter / left.sqrt())
+    }
+
     /// Root mean square of the normalised residuals.
     pub fn rms(&self) -> f64 {
         (self.chi_sq / self.count as f64).sqrt()
-    }
-}
-
-/// Weighted moments about a reference that lies among the points.
-struct Moments {
-    weight: f64,
-    centre: Point,
-    xx: f64,
-    xy: f64,
-    yy: f64,
-}
-
-impl Moments {
-    fn of<'a>(
-        points: impl Iterator<Item = &'a ScanPoint>,
-        reference: Point,
-        weight: impl Fn(&ScanPoint) -> f64,
-    ) -> Self {
-        let (mut w_sum, mut x, mut y, mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-        for point in points {
-            let (w, d) = (weight(point), point.at - reference);
-            w_sum += w;
-            x += w * d.x;
-            y += w * d.y;
-            xx += w * d.x * d.x;
-            xy += w * d.x * d.y;
-            yy += w * d.y * d.y;
-        }
-        let mean = Point::new(x, y) / w_sum;
-        Self {
-            weight: w_sum,
-            centre: reference + mean,
-            xx: xx - w_sum * mean.x * mean.x,
-            xy: xy - w_sum * mean.x * mean.y,
-            yy: yy - w_sum * mean.y * mean.y,
-        }
-    }
-
-    /// Angle of the normal (mod pi) and `Lambda`.
-    fn normal(&self) -> (f64, f64) {
-        let (numerator, denominator) = (-2.0 * self.xy, self.yy - self.xx);
-        (0.5 * numerator.atan2(denominator), numerator.hypot(denominator))
     }
 }
 
@@ -146,68 +162,194 @@ pub fn fit_line<'a, I>(points: I, config: &FitConfig) -> Result<LineFit, FitErro
 where
     I: Iterator<Item = &'a ScanPoint> + Clone,
 {
+    let own = points.clone();
     let reference = points.clone().next().ok_or(FitError::TooFew)?.at;
-    let first = Moments::of(points.clone(), reference, |p| 1.0 / p.variance_along);
-    let n = unit_normal(first.normal().0);
-    let weight_across = |n: &Point, p: &ScanPoint| 1.0 / p.variance(n);
-    let second = Moments::of(points.clone(), reference, |p| weight_across(&n, p));
-    let (mut alpha, lambda) = second.normal();
-    // Written so that NaN fails too.
-    if !(lambda > 0.0 && lambda >= config.linearity_min * (second.xx + second.yy)) {
+    let sums = points.fold(Sums::default(), |sums, point| {
+        sums.with(&(point.at - reference), 1.0 / point.variance_along)
+    });
+    let mut guess = sums.guess();
+    guess.centre += reference;
+    fit_from(&own, &guess, config)
+}
+
+/// Fits a line to points of which a first guess of its direction is known.
+///
+/// # Errors
+/// As for [`fit_line`].
+pub(super) fn fit_from<'a, I>(
+    points: &I,
+    guess: &Guess,
+    config: &FitConfig,
+) -> Result<LineFit, FitError>
+where
+    I: Iterator<Item = &'a ScanPoint> + Clone,
+{
+    let mut frame = Frame { normal: guess.normal, tangent: guess.tangent, centre: guess.centre };
+    let mut moments = frame.moments(points.clone())?;
+    for _ in 0..STEPS_MAX {
+        let slope = moments.slope();
+        // NaN is no small slope.
+        if slope.abs() < SLOPE_SETTLED {
+            break;
+        }
+        frame = frame.turned(slope, &moments);
+        moments = frame.moments(points.clone())?;
+    }
+    let slope = moments.slope();
+    let along = moments.tt;
+    // As wide as their noise makes them, points may still be a line. Written so that NaN fails too.
+    let width = (moments.ee - moments.count as f64).max(0.0);
+    if !(along > 0.0 && along - width >= config.linearity_min * (along + width)) {
         return Err(FitError::NotLinear);
     }
-    if unit_normal(alpha).dot(&second.centre) < 0.0 {
-        alpha += PI;
+    let Frame { mut normal, centre, .. } = frame.turned(slope, &moments);
+    if normal.dot(&centre) < 0.0 {
+        normal = -normal;
     }
-    let (normal, along) = (unit_normal(alpha), tangent(alpha));
-    let (rho, tc) = (normal.dot(&second.centre), along.dot(&second.centre));
+    let tangent = Point::new(-normal.y, normal.x);
+    let (rho, tc) = (normal.dot(&centre), tangent.dot(&centre));
+    let (a, b) = (tangent.dot(&moments.first), tangent.dot(&moments.last));
+    let span = (a.min(b), a.max(b));
 
-    let (mut c_rr, mut c_ra, mut c_aa) = (0.0, 0.0, 0.0);
-    let (mut count, mut chi_sq, mut worst) = (0_usize, 0.0, 0.0_f64);
-    let mut shared = 0.0;
-    let mut span = (f64::INFINITY, f64::NEG_INFINITY);
-    for point in points {
-        let d = point.at - second.centre;
-        let (t, e) = (along.dot(&d), normal.dot(&d));
-        // The weights of the last pass are held fixed; they used the normal of the first.
-        let w = weight_across(&n, point);
-        let j_alpha = (normal * t + along * e) * (-w / lambda);
-        let j_rho = normal * (w / second.weight) + j_alpha * tc;
-        let (xx, xy, yy) = point.entries();
-        let through =
-            |a: &Point, b: &Point| a.x * (xx * b.x + xy * b.y) + a.y * (xy * b.x + yy * b.y);
-        c_rr += through(&j_rho, &j_rho);
-        c_ra += through(&j_rho, &j_alpha);
-        c_aa += through(&j_alpha, &j_alpha);
-        let squared = e * e / point.variance(&normal);
-        count += 1;
-        shared += point.variance_shared;
-        chi_sq += squared;
-        worst = worst.max(squared);
-        span = (span.0.min(t + tc), span.1.max(t + tc));
-    }
-    if count < 3 {
-        return Err(FitError::TooFew);
-    }
     let half_length = 0.5 * (span.1 - span.0);
     // The variance of a mean of errors that are all alike is at most the mean of their variances.
-    let shift = config.systematic_sd.powi(2) + shared / count as f64;
-    let tilt = shift / (3.0 * half_length * half_length);
-    let fitted = Matrix2::new(c_rr, c_ra, c_ra, c_aa)
-        + Matrix2::new(shift + tc * tc * tilt, tc * tilt, tc * tilt, tilt);
-    // A sum of J C J^T is positive semi-definite; a matrix that is not is no line's.
+    let floor = config.systematic_sd * config.systematic_sd + moments.shared / moments.count as f64;
+    let chi_sq = (moments.ee - slope * moments.te).max(0.0);
+    // Points that scatter more than their sensor should know the line no better than they do.
+    let scatter = config.choice_factor * (chi_sq / (moments.count - 2) as f64).max(1.0);
+    let tilt = scatter / along + floor / (3.0 * half_length * half_length);
+    let shift = scatter / moments.weight + floor;
+    let fitted = Matrix2::new(shift + tc * tc * tilt, tc * tilt, tc * tilt, tilt);
+    // Points without extent give no finite matrix.
     let covariance = Covariance::new(fitted).map_err(|_not_a_covariance| FitError::NotLinear)?;
-    let (line, _) = UncertainLine::normal_form(rho, alpha, covariance);
-    Ok(LineFit { line, normal, tangent: along, count, chi_sq, worst: worst.sqrt(), span })
+    let (line, _) = UncertainLine::normal_form(rho, normal.y.atan2(normal.x), covariance);
+    Ok(LineFit {
+        line,
+        normal,
+        tangent,
+        count: moments.count,
+        chi_sq,
+        span,
+        weight: moments.weight,
+        along,
+        middle: tc,
+    })
+}
+
+/// Most turns of the frame, and the slope in it from which on no more is needed, radians: the error
+/// left is of the order of its square.
+const STEPS_MAX: usize = 3;
+const SLOPE_SETTLED: f64 = 0.02;
+
+/// The weight of a point, `1 / (n^T C n)`, and how far its error moves it along a line as it moves it
+/// off it, `u^T C n / (n^T C n)`. Where its beam meets the line, and not the foot of its end there, is
+/// its place: errors lie along the beam, and what they do along the wall is not the wall's doing.
+fn weight_and_slip(point: &ScanPoint, n: &Point, u: &Point) -> (f64, f64) {
+    let (towards, beside) = (point.direction.dot(n), point.direction.dot(u));
+    let (along, across) = (point.variance_along, point.variance_across);
+    let weight = 1.0 / (along * towards * towards + across * beside * beside);
+    (weight, (along - across) * towards * beside * weight)
+}
+
+/// A line that is nearly the one sought.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Frame {
+    pub(super) normal: Point,
+    pub(super) tangent: Point,
+    pub(super) centre: Point,
+}
+
+/// Weighted central moments in a frame: t along it, e across it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Moments {
+    pub(super) weight: f64,
+    t_mean: f64,
+    e_mean: f64,
+    pub(super) tt: f64,
+    te: f64,
+    pub(super) ee: f64,
+    /// Sum of the variances that neighbours share.
+    shared: f64,
+    count: usize,
+    first: Point,
+    last: Point,
+}
+
+impl Frame {
+    pub(super) fn moments<'a>(
+        &self,
+        points: impl Iterator<Item = &'a ScanPoint>,
+    ) -> Result<Moments, FitError> {
+        let Self { normal: n, tangent: u, centre } = self;
+        let (mut weight, mut t_sum, mut e_sum) = (0.0, 0.0, 0.0);
+        let (mut tt, mut te, mut ee) = (0.0, 0.0, 0.0);
+        let (mut shared, mut count) = (0.0, 0_usize);
+        let (mut first, mut last) = (*centre, *centre);
+        for point in points {
+            let d = point.at - centre;
+            let e = n.dot(&d);
+            let (w, slip) = weight_and_slip(point, n, u);
+            let t = u.dot(&d) - e * slip;
+            let (wt, we) = (w * t, w * e);
+            weight += w;
+            t_sum += wt;
+            e_sum += we;
+            tt += wt * t;
+            te += wt * e;
+            ee += we * e;
+            shared += point.variance_shared;
+            if count == 0 {
+                first = point.at;
+            }
+            last = point.at;
+            count += 1;
+        }
+        if count < 3 {
+            return Err(FitError::TooFew);
+        }
+        let (t_mean, e_mean) = (t_sum / weight, e_sum / weight);
+        Ok(Moments {
+            weight,
+            t_mean,
+            e_mean,
+            tt: tt - t_sum * t_mean,
+            te: te - t_sum * e_mean,
+            ee: ee - e_sum * e_mean,
+            shared,
+            count,
+            first,
+            last,
+        })
+    }
+
+    /// The line that the moments ask for.
+    pub(super) fn turned(&self, slope: f64, moments: &Moments) -> Self {
+        let stretch = 1.0 / (1.0 + slope * slope).sqrt();
+        Self {
+            normal: (self.normal - self.tangent * slope) * stretch,
+            tangent: (self.tangent + self.normal * slope) * stretch,
+            centre: self.centre + self.tangent * moments.t_mean + self.normal * moments.e_mean,
+        }
+    }
+}
+
+impl Moments {
+    /// Regression of e on t.
+    pub(super) fn slope(&self) -> f64 {
+        self.te / self.tt
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::perception::points::NoiseConfig;
+    use mapfold_map::geometry::{tangent, unit_normal};
     use proptest::prelude::*;
+    use std::f64::consts::PI;
 
-    const NO_FLOOR: FitConfig = FitConfig { systematic_sd: 0.0, linearity_min: 0.9 };
+    const NO_FLOOR: FitConfig =
+        FitConfig { systematic_sd: 0.0, linearity_min: 0.9, choice_factor: 1.0 };
     const NOISE: NoiseConfig =
         NoiseConfig { range_sd: 0.02, range_sd_per_metre: 0.002, bearing_sd: 0.003 };
 
@@ -237,7 +379,7 @@ mod tests {
             assert!((fit.line.line.rho() - 2.0).abs() < 1e-12, "{degrees}");
             let turn = mapfold_map::geometry::difference(fit.line.line.alpha(), alpha);
             assert!(turn.abs() < 1e-12, "{degrees}: {turn}");
-            assert!((fit.length() - 3.0).abs() < 1e-9 && fit.worst < 1e-9);
+            assert!((fit.length() - 3.0).abs() < 1e-9 && fit.chi_sq < 1e-9);
         }
     }
 
@@ -301,13 +443,12 @@ mod tests {
     }
 
     #[test]
-    fn the_jacobians_are_those_of_the_closed_form() {
-        // C = sum J_i C_i J_i^T with J_i by central differences, against the fit's covariance.
+    fn the_covariance_is_that_of_the_closed_form_through_its_jacobians() {
+        // C = sum J_i C_i J_i^T with J_i by central differences, against the fit's covariance, with
+        // residuals as large as the noise.
         let points = wall(1.5, -2.0, (-2.0, 0.7), 15, |i| 0.01 * ((i * 7 % 5) as f64 - 2.0));
         let fit = fit_line(points.iter(), &NO_FLOOR).unwrap();
-        let first = Moments::of(points.iter(), points[0].at, |p| 1.0 / p.variance_along);
-        let n = unit_normal(first.normal().0);
-        let weights: Vec<f64> = points.iter().map(|p| 1.0 / p.variance(&n)).collect();
+        let weights: Vec<f64> = points.iter().map(|p| 1.0 / p.variance(&fit.normal)).collect();
         let at: Vec<Point> = points.iter().map(|p| p.at).collect();
         let h = 1e-6;
         let mut covariance = Matrix2::zeros();
@@ -326,7 +467,7 @@ mod tests {
             covariance += j * point.covariance().matrix() * j.transpose();
         }
         let difference = (covariance - fit.line.covariance.matrix()).amax();
-        assert!(difference < 1e-8 * covariance.amax(), "{difference:e}");
+        assert!(difference < 5e-3 * covariance.amax(), "{difference:e}");
     }
 
     proptest! {

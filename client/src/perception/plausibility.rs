@@ -1,9 +1,8 @@
 //! Which readings are a surface at all.
 
-use std::f64::consts::FRAC_PI_2;
-
 use mapfold_map::geometry::Point;
 
+use super::points::Directions;
 use crate::sensor::{Scan, ScannerProfile};
 
 /// What a beam's reading is.
@@ -41,9 +40,12 @@ pub struct PlausibilityConfig {
     /// the line of sight between foreground and background. 10 degrees, as the worst incidence
     /// at which points still count as one surface.
     pub veil_angle: f64,
-    /// A point that continues the line through its two neighbours on one side to within this many
-    /// degrees of the angle at them is a wall seen at a grazing angle and no veil, radians.
+    /// A point that continues the line through its two neighbours on one side to within this angle at
+    /// them, and three standard deviations of it, is a wall seen at a grazing angle and no veil,
+    /// radians.
     pub continuation_angle: f64,
+    /// Standard deviation of a range, metres.
+    pub range_sd: f64,
 }
 
 impl PlausibilityConfig {
@@ -55,78 +57,108 @@ impl PlausibilityConfig {
             veil_step: 3.0 * profile.range_sd(2.0) + 0.05,
             veil_angle: 10f64.to_radians(),
             continuation_angle: 3f64.to_radians(),
+            range_sd: profile.range_sd(2.0),
         }
     }
 }
 
 /// Judges every beam of a scan.
 pub fn judge(scan: &Scan, config: &PlausibilityConfig) -> Vec<BeamState> {
+    let mut states = Vec::new();
+    judge_into(scan, Directions::default().of(scan), config, &mut states);
+    states
+}
+
+/// Judges every beam of a scan, into a buffer that is used again.
+pub fn judge_into(
+    scan: &Scan,
+    directions: &[Point],
+    config: &PlausibilityConfig,
+    states: &mut Vec<BeamState>,
+) {
     let range_max = config.range_max.min(scan.range_max);
-    let by_range: Vec<BeamState> = scan
-        .ranges
-        .iter()
-        .map(|&range| {
-            if !range.is_finite() {
-                if range == f64::INFINITY { BeamState::NoReturn } else { BeamState::Invalid }
-            } else if range < config.range_min {
-                BeamState::Invalid
-            } else if range >= range_max {
-                BeamState::NoReturn
-            } else {
-                BeamState::Hit
+    states.clear();
+    states.extend(scan.ranges.iter().map(|&range| {
+        // NaN fails both.
+        if range >= config.range_min && range < range_max {
+            BeamState::Hit
+        } else if range >= range_max {
+            BeamState::NoReturn
+        } else {
+            BeamState::Invalid
+        }
+    }));
+    let count = states.len();
+    let step = config.veil_step;
+    let between = |r0: f64, r: f64, r1: f64| {
+        (r0 - r > step && r - r1 > step) || (r - r0 > step && r1 - r > step)
+    };
+    let closed = scan.is_full_circle();
+    let veils = Veils { ranges: &scan.ranges, directions, closed, config };
+    for (i, three) in scan.ranges.windows(3).enumerate() {
+        if between(three[0], three[1], three[2]) && veils.holds(states, i + 1) {
+            states[i + 1] = BeamState::Mixed;
+        }
+    }
+    if closed {
+        for (before, beam, after) in [(count - 2, count - 1, 0), (count - 1, 0, 1)] {
+            let ranges = [before, beam, after].map(|beam| scan.ranges[beam]);
+            if between(ranges[0], ranges[1], ranges[2]) && veils.holds(states, beam) {
+                states[beam] = BeamState::Mixed;
             }
-        })
-        .collect();
-    (0..by_range.len())
-        .map(|beam| {
-            if by_range[beam] == BeamState::Hit && is_veil(scan, &by_range, beam, config) {
-                BeamState::Mixed
-            } else {
-                by_range[beam]
-            }
-        })
-        .collect()
+        }
+    }
 }
 
-/// Whether the reading lies in the air between a foreground and a background.
-fn is_veil(scan: &Scan, states: &[BeamState], beam: usize, config: &PlausibilityConfig) -> bool {
-    let neighbour = |offset: isize| -> Option<usize> {
-        let count = states.len() as isize;
-        let at = beam as isize + offset;
-        let at = if scan.is_full_circle() { at.rem_euclid(count) } else { at };
-        ((0..count).contains(&at) && states[at as usize] == BeamState::Hit).then_some(at as usize)
-    };
-    let (Some(before), Some(after)) = (neighbour(-1), neighbour(1)) else { return false };
-    let (r, r0, r1) = (scan.ranges[beam], scan.ranges[before], scan.ranges[after]);
-    let between = (r0 - r > config.veil_step && r - r1 > config.veil_step)
-        || (r - r0 > config.veil_step && r1 - r > config.veil_step);
-    if !between {
-        return false;
-    }
-    let at = |b: usize| scan.direction(b) * scan.ranges[b];
-    let p = at(beam);
-    let along_beam = |q: &Point| {
-        let way = q - p;
-        angle_between_lines(&way, &scan.direction(beam)) < config.veil_angle
-    };
-    let (p0, p1) = (at(before), at(after));
-    if !along_beam(&p0) || !along_beam(&p1) {
-        return false;
-    }
-    // A wall at a grazing angle looks the same to three beams; five tell.
-    let continues = |near: usize, far: Option<usize>| {
-        far.is_some_and(|far| {
-            let (near, far) = (at(near), at(far));
-            angle_between_lines(&(near - far), &(p - near)) < config.continuation_angle
-        })
-    };
-    !(continues(before, neighbour(-2)) || continues(after, neighbour(2)))
+/// What it takes to tell a veil.
+struct Veils<'a> {
+    ranges: &'a [f64],
+    directions: &'a [Point],
+    closed: bool,
+    config: &'a PlausibilityConfig,
 }
 
-/// The angle between two lines of these directions, 0 to pi/2.
-fn angle_between_lines(a: &Point, b: &Point) -> f64 {
-    let angle = a.perp(b).atan2(a.dot(b)).abs();
-    if angle > FRAC_PI_2 { std::f64::consts::PI - angle } else { angle }
+impl Veils<'_> {
+    /// Whether a reading between its neighbours' lies in the air between a foreground and a
+    /// background.
+    fn holds(&self, states: &[BeamState], beam: usize) -> bool {
+        let point = |offset: isize| -> Option<Point> {
+            let count = states.len() as isize;
+            let at = beam as isize + offset;
+            let at = if self.closed { at.rem_euclid(count) } else { at };
+            let at = (0..count).contains(&at).then_some(at as usize)?;
+            // A veil itself still has a range, and beams before this one have been judged.
+            let has_range = matches!(states[at], BeamState::Hit | BeamState::Mixed);
+            has_range.then(|| self.directions[at] * self.ranges[at])
+        };
+        let (Some(p), Some(before), Some(after)) = (point(0), point(-1), point(1)) else {
+            return false;
+        };
+        let direction = self.directions[beam];
+        let narrow = self.config.veil_angle.tan();
+        let along_beam = |q: &Point| turns_less(&(q - p), &direction, narrow);
+        if !along_beam(&before) || !along_beam(&after) {
+            return false;
+        }
+        // A wall at a grazing angle looks the same to three beams; five tell.
+        let slight = self.config.continuation_angle.tan();
+        let continues = |near: Point, far: Option<Point>| {
+            far.is_some_and(|far| {
+                let (before, after) = (near - far, p - near);
+                // Ranges err along the beam, and across the wall by the sine of the angle between.
+                let length = after.norm();
+                let sine = (after.perp(&direction) / length).abs();
+                let sd = self.config.range_sd * sine * (6f64.sqrt() / before.norm().min(length));
+                turns_less(&before, &after, slight + 3.0 * sd)
+            })
+        };
+        !(continues(before, point(-2)) || continues(after, point(2)))
+    }
+}
+
+/// Whether the angle between two lines of these directions has less than this tangent.
+fn turns_less(a: &Point, b: &Point, tangent: f64) -> bool {
+    a.perp(b).abs() < tangent * a.dot(b).abs()
 }
 
 #[cfg(test)]

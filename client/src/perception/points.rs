@@ -9,7 +9,7 @@ use nalgebra::Matrix2;
 
 use super::BeamState;
 use super::correction::BeamNoise;
-use crate::sensor::{Scan, ScannerProfile};
+use crate::sensor::{Scan, ScanGeometry, ScannerProfile};
 
 /// The noise of one reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,7 +55,8 @@ pub struct ScanPoint {
 impl ScanPoint {
     /// The point of a beam of this range and direction.
     pub fn new(beam: usize, range: f64, direction: Point, noise: &NoiseConfig) -> Self {
-        let range_sd_sq = noise.range_sd.powi(2) + (noise.range_sd_per_metre * range).powi(2);
+        let growth = noise.range_sd_per_metre * range;
+        let range_sd_sq = noise.range_sd * noise.range_sd + growth * growth;
         Self {
             beam,
             range,
@@ -87,14 +88,40 @@ impl ScanPoint {
     }
 }
 
+/// Where the beams of a scanner point, remembered from scan to scan.
+#[derive(Debug, Default)]
+pub struct Directions {
+    geometry: Option<ScanGeometry>,
+    along: Vec<Point>,
+}
+
+impl Directions {
+    /// The unit vectors along the beams of a scan.
+    pub fn of(&mut self, scan: &Scan) -> &[Point] {
+        if self.geometry != Some(scan.geometry) || self.along.len() != scan.ranges.len() {
+            self.geometry = Some(scan.geometry);
+            self.along.clear();
+            self.along.extend((0..scan.ranges.len()).map(|beam| scan.direction(beam)));
+        }
+        &self.along
+    }
+}
+
 /// The points of all beams that hit something, in the order of the beams.
-pub fn points(scan: &Scan, states: &[BeamState], noise: &NoiseConfig) -> Vec<ScanPoint> {
-    states
-        .iter()
-        .enumerate()
-        .filter(|(_, state)| **state == BeamState::Hit)
-        .map(|(beam, _)| ScanPoint::new(beam, scan.ranges[beam], scan.direction(beam), noise))
-        .collect()
+pub fn points_into(
+    scan: &Scan,
+    states: &[BeamState],
+    directions: &[Point],
+    noise: &NoiseConfig,
+    points: &mut Vec<ScanPoint>,
+) {
+    points.clear();
+    let beams = states.iter().zip(&scan.ranges).zip(directions).enumerate();
+    for (beam, ((state, range), direction)) in beams {
+        if *state == BeamState::Hit {
+            points.push(ScanPoint::new(beam, *range, *direction, noise));
+        }
+    }
 }
 
 /// Gives points the noise of their own beams.

@@ -1,37 +1,60 @@
 //! From the sensor's frame to the robot's.
 
-use mapfold_map::geometry::{Interval, Pose, Robot, Sensor, UncertainLine};
+use mapfold_map::geometry::{Interval, Point, Pose, Robot, Sensor, UncertainLine};
 use mapfold_map::vector::{Facing, ObservedCluster, ObservedSegment};
 use nalgebra::Matrix2;
 
-use super::Config;
-use super::clusters::FoundCluster;
+use super::clusters::{ClusterConfig, FoundCluster};
 use super::ends::Ended;
-use super::seen_through::{self, Sweep};
+use super::seen_through::{self, SeenThroughConfig, Sweep};
 use super::split::FoundLine;
 use crate::sensor::Scan;
 
-/// A line with its ends as the robot hands it in.
+/// Where the sensor sits on the robot, its trigonometry done once a scan.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mount {
+    heading: f64,
+    turn: Matrix2<f64>,
+    position: Point,
+}
+
+impl Mount {
+    /// The mount of a scan.
+    pub(super) fn of(scan: &Scan) -> Self {
+        let robot_from_sensor: &Pose<Robot, Sensor> = &scan.robot_from_sensor;
+        let heading = robot_from_sensor.heading();
+        let (s, c) = heading.sin_cos();
+        Self { heading, turn: Matrix2::new(c, -s, s, c), position: robot_from_sensor.position() }
+    }
+
+    fn act(&self, p: &Point) -> Point {
+        self.position + self.turn * p
+    }
+}
+
+/// A line with its ends as the robot hands it in. `seen_through` is an empty buffer to fill.
 pub(super) fn in_robot_frame(
     line: &FoundLine,
+    count: usize,
     ended: &Ended,
+    mount: &Mount,
     sweep: &Sweep<'_>,
-    scan: &Scan,
-    config: &Config,
+    config: &SeenThroughConfig,
+    mut seen_through: Vec<Interval>,
 ) -> ObservedSegment {
-    let robot_from_sensor: &Pose<Robot, Sensor> = &scan.robot_from_sensor;
-    let moved = robot_from_sensor.act_on_line(&line.fit.line.line);
-    let covariance = line.fit.line.covariance.transformed(&moved.j_line_line);
-    let (uncertain, turned) =
-        UncertainLine::<Robot>::normal_form(moved.rho, moved.alpha, covariance);
-    // Along the moved tangent, coordinates shift by the sensor's own: that is `j_line_line`'s tau.
-    let shift = moved.j_line_line[(0, 1)];
+    let fit = &line.fit;
+    // `alpha' = alpha + heading`, `rho' = rho + n'.p`: as `Pose::act_on_line`, without its angles.
+    let rho = fit.line.line.rho() + (mount.turn * fit.normal).dot(&mount.position);
+    // Along the moved tangent, coordinates shift by the sensor's own.
+    let shift = (mount.turn * fit.tangent).dot(&mount.position);
+    let covariance = fit.line.covariance.transformed(&Matrix2::new(1.0, shift, 0.0, 1.0));
+    let alpha = fit.line.line.alpha() + mount.heading;
+    let (uncertain, turned) = UncertainLine::<Robot>::normal_form(rho, alpha, covariance);
     let (from, to) = (ended.from + shift, ended.to + shift);
     let [lower, upper] = ended.ends;
     let outermost = (line.first(), line.last());
     let span = (ended.from, ended.to);
-    let mut seen_through =
-        seen_through::stretches(sweep, &line.fit, outermost, span, shift, &config.seen_through);
+    seen_through::stretches(sweep, fit, outermost, span, shift, config, &mut seen_through);
     if turned {
         seen_through.reverse();
         for stretch in &mut seen_through {
@@ -40,29 +63,26 @@ pub(super) fn in_robot_frame(
     }
     let (from, to, ends) =
         if turned { (-to, -from, [upper, lower]) } else { (from, to, [lower, upper]) };
-    // A wall is seen from where the sensor is, which need not be the robot's centre's side.
-    let across = uncertain.line.across(&robot_from_sensor.position());
-    let facing =
-        if across < 0.0 || (across == 0.0 && !turned) { Facing::Origin } else { Facing::Away };
-    ObservedSegment {
-        line: uncertain,
-        from,
-        to,
-        facing,
-        ends,
-        points: line.members.len() as u32,
-        seen_through,
-    }
+    // A wall is seen from where the sensor is, which need not be the robot's centre's side: normals
+    // point away from the sensor, until the robot's centre turns them round.
+    let facing = if turned { Facing::Away } else { Facing::Origin };
+    ObservedSegment { line: uncertain, from, to, facing, ends, points: count as u32, seen_through }
 }
 
 /// A cluster as the robot hands it in.
-pub(super) fn cluster_in_robot_frame(cluster: &FoundCluster, scan: &Scan) -> ObservedCluster {
-    let pose = &scan.robot_from_sensor;
-    let (s, c) = pose.heading().sin_cos();
+pub(super) fn cluster_in_robot_frame(
+    cluster: &mut FoundCluster,
+    mount: &Mount,
+    config: &ClusterConfig,
+) -> ObservedCluster {
+    let mut hull = std::mem::take(&mut cluster.hull);
+    for p in &mut hull {
+        *p = mount.act(p);
+    }
     ObservedCluster {
-        hull: cluster.hull.iter().map(|p| pose.act(p)).collect(),
-        centroid: pose.act(&cluster.centroid),
-        covariance: cluster.covariance.transformed(&Matrix2::new(c, -s, s, c)),
-        points: cluster.members.len() as u32,
+        hull,
+        centroid: mount.act(&cluster.centroid()),
+        covariance: cluster.covariance(config).transformed(&mount.turn),
+        points: cluster.count as u32,
     }
 }

@@ -6,23 +6,30 @@
 //! All tests are normalised by each point's own deviation across the line, never a fixed width.
 //! A merge pass then joins neighbours that one line explains, points at the seams go to the
 //! closer line, and what is too short or too curved to be a wall is let go.
+//!
+//! Until the last of these, lines are guesses from running sums, which cost the same for three
+//! points as for three hundred.
 
 use std::ops::Range;
 
-use mapfold_map::geometry::{Covariance, Point, difference, mahalanobis_sq};
-use nalgebra::{Matrix2, Vector2};
+use mapfold_map::geometry::Point;
 
 use super::Config;
-use super::fit::{FitConfig, LineFit, fit_line};
-use super::points::ScanPoint;
+use super::cloud::Cloud;
+use super::explain::explaining;
+use super::fit::LineFit;
+use super::guess::Guess;
+use super::settle::clear_of_seams;
 
 /// When a run of points is a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SplitConfig {
-    /// Deviations off the chord from which a split is proposed.
-    pub chord_sds: f64,
+    /// Deviations off a line up to which a point next to its end is taken for its own.
+    pub near_sds: f64,
     /// Deviations off the least-squares line up to which a point belongs to it.
     pub residual_sds: f64,
+    /// So many deviations off the chord, the least-squares line need not be asked.
+    pub hopeless_sds: f64,
     /// Standard normal quantile at which the sum of squared residuals convicts (3.09: 99.9 %).
     pub chi_sq_z: f64,
     /// Fewest points of a line.
@@ -31,6 +38,20 @@ pub struct SplitConfig {
     pub points_min_fine: usize,
     /// Shortest line, metres.
     pub length_min: f64,
+    /// Largest standard deviation of a line's direction, radians: beyond, it is not known.
+    pub direction_sd_max: f64,
+    /// A line whose points bow by more than this share of its length, and more than so many standard
+    /// deviations, is the side of something round.
+    pub bow_max: f64,
+    /// See `bow_max`.
+    pub bow_sds: f64,
+    /// Longest line of which this is asked, metres: longer ones are walls.
+    pub bow_length_max: f64,
+    /// A shorter line than this, metres, must show that it is straight: it could not bow by
+    /// `bow_doubt` of its length unseen. Legs of people and of tables are as long.
+    pub plain_length: f64,
+    /// See `plain_length`.
+    pub bow_doubt: f64,
     /// Largest root mean square of the normalised residuals: more is a curve.
     pub rms_max: f64,
     /// Gate for joining two lines, chi-square with two degrees of freedom. 23.0 (one in a hundred
@@ -47,23 +68,40 @@ pub struct SplitConfig {
     pub model_sd: (f64, f64),
     /// Stray points between two lines that still may be one.
     pub stray_points: usize,
+    /// Where two lines meet, points within so many deviations of their intersection may be either's
+    /// and bend neither.
+    pub seam_sds: f64,
+    /// Deviations from which on the outermost points of a line together are not its own.
+    pub astray_sds: f64,
+    /// Most points that are looked at for this at either end.
+    pub astray_points_max: usize,
 }
 
 impl Default for SplitConfig {
     fn default() -> Self {
         Self {
-            chord_sds: 3.0,
+            near_sds: 3.0,
             residual_sds: 4.0,
+            hopeless_sds: 15.0,
             chi_sq_z: 3.09,
             points_min: 5,
             points_min_fine: 8,
             length_min: 0.20,
+            direction_sd_max: 8f64.to_radians(),
+            bow_max: 0.03,
+            bow_sds: 3.5,
+            bow_length_max: 1.0,
+            plain_length: 0.35,
+            bow_doubt: 0.10,
             rms_max: 2.0,
             merge_gate: 23.0,
             merge_sds: 5.0,
             merge_chi_sq_z: 4.75,
             model_sd: (0.005, 0.2 * std::f64::consts::PI / 180.0),
             stray_points: 2,
+            seam_sds: 1.0,
+            astray_sds: 4.0,
+            astray_points_max: 16,
         }
     }
 }
@@ -74,275 +112,343 @@ impl SplitConfig {
         // Half a degree itself is coarse; the margin is for its rounding.
         if increment < 0.49_f64.to_radians() { self.points_min_fine } else { self.points_min }
     }
-
-    fn confirms(&self, fit: &LineFit) -> bool {
-        fit.worst <= self.residual_sds && chi_sq_below(fit, self.chi_sq_z)
-    }
-
-    fn confirms_union(&self, fit: &LineFit) -> bool {
-        fit.worst <= self.merge_sds && chi_sq_below(fit, self.merge_chi_sq_z)
-    }
 }
 
 /// A line and the points that support it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FoundLine {
-    /// Indices of its points, ascending.
-    pub members: Vec<usize>,
+    /// Its points, but for those that are marked as strays.
+    pub points: Range<usize>,
     /// The line.
     pub fit: LineFit,
 }
 
 impl FoundLine {
-    fn new(points: &[ScanPoint], members: Vec<usize>, config: &FitConfig) -> Option<Self> {
-        let fit = fit_line(members.iter().map(|&i| &points[i]), config).ok()?;
-        Some(Self { members, fit })
-    }
-
     /// Index of its first point.
     pub fn first(&self) -> usize {
-        self.members.first().copied().unwrap_or(usize::MAX)
+        self.points.start
     }
 
     /// Index of its last point.
     pub fn last(&self) -> usize {
-        self.members.last().copied().unwrap_or(usize::MAX)
-    }
-
-    fn refit(&mut self, points: &[ScanPoint], config: &FitConfig) {
-        if let Ok(fit) = fit_line(self.members.iter().map(|&i| &points[i]), config) {
-            self.fit = fit;
-        }
+        self.points.end - 1
     }
 }
 
-/// Finds the lines of a run and appends them to `lines`; stretches of points in no line go to
-/// `loose`.
-pub fn lines(
-    points: &[ScanPoint],
-    run: Range<usize>,
-    increment: f64,
-    config: &Config,
-    lines: &mut Vec<FoundLine>,
-    loose: &mut Vec<Range<usize>>,
-) {
-    let split = &config.split;
-    let fewest = split.fewest(increment);
-    let mut found = propose(points, run.clone(), fewest, config);
-    share_out(points, &mut found, &config.fit);
-    extend(points, &run, &mut found, config);
-    merge(points, &mut found, config);
-    contest(points, &mut found, &config.fit);
-    found.retain(|line| {
-        line.members.len() >= fewest
-            && line.fit.length() >= split.length_min
-            && line.fit.rms() <= split.rms_max
-    });
-    let mut free_from = run.start;
-    for &member in found.iter().flat_map(|l| &l.members) {
-        if member > free_from {
-            loose.push(free_from..member);
-        }
-        free_from = member + 1;
-    }
-    if free_from < run.end {
-        loose.push(free_from..run.end);
-    }
-    lines.append(&mut found);
+/// A stretch of points that may be a line.
+#[derive(Debug, Clone)]
+pub(super) struct Piece {
+    pub(super) points: Range<usize>,
+    /// Points among them that do not lie on it.
+    pub(super) strays: usize,
+    pub(super) guess: Guess,
 }
 
-/// Iterative End Point Fit: ascending candidates; neighbours share the point they were split at.
-fn propose(
-    points: &[ScanPoint],
-    run: Range<usize>,
-    fewest: usize,
-    config: &Config,
-) -> Vec<FoundLine> {
-    let mut found = Vec::new();
-    let mut waiting = vec![run];
-    while let Some(range) = waiting.pop() {
-        if range.len() < fewest {
-            continue;
+/// Buffers that are used from run to run.
+#[derive(Debug, Default)]
+pub(super) struct Splitter {
+    waiting: Vec<Range<usize>>,
+    pieces: Vec<Piece>,
+    /// For every point of the scan, whether it lies among a line's points and not on it.
+    pub(super) stray: Vec<bool>,
+}
+
+impl Splitter {
+    /// Forgets the last scan.
+    pub(super) fn begin(&mut self, points: usize) {
+        self.stray.clear();
+        self.stray.resize(points, false);
+    }
+
+    /// Finds the lines of a run and appends them to `lines`; stretches of points in no line go to
+    /// `loose`.
+    pub(super) fn lines(
+        &mut self,
+        cloud: &Cloud,
+        run: &Range<usize>,
+        increment: f64,
+        config: &Config,
+        lines: &mut Vec<FoundLine>,
+        loose: &mut Vec<Range<usize>>,
+    ) {
+        let fewest = config.split.fewest(increment);
+        self.pieces.clear();
+        if run.len() >= fewest {
+            self.propose(cloud, run, fewest, config);
+            self.share_out(cloud);
+            self.extend(cloud, run, config);
+            self.merge(cloud, config);
+            self.contest(cloud);
         }
-        let (farthest, sds) = farthest_from_chord(&points[range.clone()]);
-        let candidate = FoundLine::new(points, range.clone().collect(), &config.fit);
-        let straight = sds <= config.split.chord_sds;
-        match candidate {
-            Some(line) if straight || config.split.confirms(&line.fit) => found.push(line),
-            _ if straight => {}
-            _ => {
-                let at = range.start + farthest;
-                waiting.push(at..range.end);
-                waiting.push(range.start..at + 1);
+        let mut free_from = run.start;
+        for (i, piece) in self.pieces.iter().enumerate() {
+            let before = i.checked_sub(1).map(|i| &self.pieces[i]);
+            let clear = clear_of_seams(cloud, piece, [before, self.pieces.get(i + 1)], config);
+            let line = self.settled(cloud, piece, clear, fewest, config);
+            let Some(line) = line else { continue };
+            for at in line.points.clone() {
+                if self.stray[at] {
+                    continue;
+                }
+                if at > free_from {
+                    loose.push(free_from..at);
+                }
+                free_from = at + 1;
+            }
+            lines.push(line);
+        }
+        if free_from < run.end {
+            loose.push(free_from..run.end);
+        }
+    }
+
+    /// Iterative End Point Fit: ascending candidates; neighbours share the point they were split at.
+    fn propose(&mut self, cloud: &Cloud, run: &Range<usize>, fewest: usize, config: &Config) {
+        self.waiting.clear();
+        self.waiting.push(run.clone());
+        while let Some(range) = self.waiting.pop() {
+            if range.len() < fewest {
+                continue;
+            }
+            let (farthest, sds_sq) = farthest_from_chord(cloud, &range);
+            let hopeless = sds_sq > config.split.hopeless_sds * config.split.hopeless_sds;
+            if !hopeless {
+                let guess = cloud.guess(&range);
+                let (sds, z) = (config.split.residual_sds, config.split.chi_sq_z);
+                if let Some(guess) = explaining(cloud, &range, &self.stray, &guess, sds, z) {
+                    self.pieces.push(Piece { points: range, strays: 0, guess });
+                    continue;
+                }
+            }
+            self.waiting.push(farthest..range.end);
+            self.waiting.push(range.start..farthest + 1);
+        }
+    }
+
+    /// Gives the point that two neighbours share to the closer one.
+    fn share_out(&mut self, cloud: &Cloud) {
+        for i in 1..self.pieces.len() {
+            let [a, b] = neighbours(&mut self.pieces, i);
+            if a.points.end == b.points.start + 1 {
+                let shared = &cloud.points[b.points.start];
+                if a.guess.normalised_sq(shared) <= b.guess.normalised_sq(shared) {
+                    b.points.start += 1;
+                    b.guess = cloud.guess(&b.points);
+                } else {
+                    a.points.end -= 1;
+                    a.guess = cloud.guess(&a.points);
+                }
             }
         }
     }
-    found
+
+    /// Lets every line take the free points next to its ends that lie on it.
+    fn extend(&mut self, cloud: &Cloud, run: &Range<usize>, config: &Config) {
+        let near_sq = config.split.near_sds * config.split.near_sds;
+        let mut from = run.start;
+        for i in 0..self.pieces.len() {
+            let to = self.pieces.get(i + 1).map_or(run.end, |next| next.points.start);
+            let piece = &mut self.pieces[i];
+            let near = |at: usize| piece.guess.normalised_sq(&cloud.points[at]) <= near_sq;
+            let Range { mut start, mut end } = piece.points;
+            while start > from && near(start - 1) {
+                start -= 1;
+            }
+            while end < to && near(end) {
+                end += 1;
+            }
+            if piece.points != (start..end) {
+                piece.points = start..end;
+                piece.guess = cloud.guess(&piece.points);
+            }
+            from = end;
+        }
+    }
+
+    /// Joins neighbours that one line explains, stray points between them included if they lie on it.
+    fn merge(&mut self, cloud: &Cloud, config: &Config) {
+        let mut i = 0;
+        while i + 1 < self.pieces.len() {
+            if let Some(union) = self.union(cloud, i, config) {
+                self.pieces[i] = union;
+                self.pieces.remove(i + 1);
+                // The longer line may now also explain its predecessor.
+                i = i.saturating_sub(1);
+            } else {
+                i += 1;
+            }
+        }
+    }
+
+    /// The one line of piece `i` and the next, if it explains them; an end point that alone stands
+    /// against it (the last of a run may well be another surface's first) is left out.
+    fn union(&mut self, cloud: &Cloud, i: usize, config: &Config) -> Option<Piece> {
+        let split = &config.split;
+        let (a, b) = (&self.pieces[i], &self.pieces[i + 1]);
+        let between = a.points.end..b.points.start;
+        if between.len() > split.stray_points || !may_be_one(a, b, cloud, config) {
+            return None;
+        }
+        self.stray[between.clone()].fill(true);
+        let strays = a.strays + b.strays + between.len();
+        let mut points = a.points.start..b.points.end;
+        let mut guess = guess_without(cloud, &points, &self.stray, strays);
+        let holding = |points: &Range<usize>, guess: &Guess| {
+            explaining(cloud, points, &self.stray, guess, split.merge_sds, split.merge_chi_sq_z)
+        };
+        if let Some(better) = holding(&points, &guess) {
+            guess = better;
+        } else {
+            let off = |at: usize| guess.normalised_sq(&cloud.points[at]);
+            if off(points.start) >= off(points.end - 1) {
+                points.start += 1;
+            } else {
+                points.end -= 1;
+            }
+            guess = guess_without(cloud, &points, &self.stray, strays);
+            let Some(better) = holding(&points, &guess) else {
+                self.stray[between].fill(false);
+                return None;
+            };
+            guess = better;
+        }
+        let mut strays = strays;
+        for at in between {
+            let on = guess.normalised_sq(&cloud.points[at]) <= split.residual_sds.powi(2);
+            self.stray[at] = !on;
+            strays -= usize::from(on);
+        }
+        let guess = guess_without(cloud, &points, &self.stray, strays);
+        Some(Piece { points, strays, guess })
+    }
+
+    /// Points at the seam of two lines go to the closer one.
+    fn contest(&mut self, cloud: &Cloud) {
+        for i in 1..self.pieces.len() {
+            let [a, b] = neighbours(&mut self.pieces, i);
+            if a.points.end != b.points.start {
+                continue;
+            }
+            let seam = a.points.end;
+            let closer = |at: usize, this: &Guess, than: &Guess| {
+                let point = &cloud.points[at];
+                this.normalised_sq(point) < than.normalised_sq(point)
+            };
+            let down = a.points.clone().skip(3).rev();
+            let to_b = down.take_while(|at| closer(*at, &b.guess, &a.guess)).count();
+            let up = b.points.start..b.points.end.saturating_sub(3);
+            let to_a = up.take_while(|at| closer(*at, &a.guess, &b.guess)).count();
+            let seam = if to_b > 0 { seam - to_b } else { seam + to_a };
+            if seam != a.points.end {
+                a.points.end = seam;
+                b.points.start = seam;
+                a.guess = guess_without(cloud, &a.points, &self.stray, a.strays);
+                b.guess = guess_without(cloud, &b.points, &self.stray, b.strays);
+            }
+        }
+    }
 }
 
-/// The inner point farthest from the chord, in its own deviations; of a run that ends where it
-/// began, the one farthest from there.
-fn farthest_from_chord(run: &[ScanPoint]) -> (usize, f64) {
-    let (a, b) = (run[0].at, run[run.len() - 1].at);
+fn neighbours(pieces: &mut [Piece], i: usize) -> [&mut Piece; 2] {
+    let (left, right) = pieces.split_at_mut(i);
+    [&mut left[i - 1], &mut right[0]]
+}
+
+/// The inner point farthest from the chord, and how far in its own deviations, squared; of a run
+/// that ends where it began, the one farthest from there.
+fn farthest_from_chord(cloud: &Cloud, run: &Range<usize>) -> (usize, f64) {
+    let (a, b) = (cloud.at[run.start], cloud.at[run.end - 1]);
     let chord = b - a;
-    let length = chord.norm();
-    let mut best = (run.len() / 2, 0.0);
+    let length_sq = chord.norm_squared();
+    let inner = &cloud.at[run.start + 1..run.end - 1];
+    let (mut best, mut farthest) = (run.len() / 2 - 1, 0.0);
     // A chord shorter than a hand has no direction worth the name.
-    let n = (length > 0.1).then(|| Point::new(-chord.y, chord.x) / length);
-    for (i, p) in run.iter().enumerate().take(run.len() - 1).skip(1) {
-        let d = p.at - a;
-        let sds = match n {
-            Some(n) => n.dot(&d).abs() / p.variance(&n).sqrt(),
-            None => d.norm() / (p.variance_along + p.variance_across).sqrt(),
-        };
-        if sds > best.1 {
-            best = (i, sds);
+    if length_sq > 0.01 {
+        let n = Point::new(-chord.y, chord.x) / length_sq.sqrt();
+        let from = n.dot(&a);
+        let off = |p: &Point| (n.dot(p) - from).abs();
+        // Four at a time: that a new farthest is among them is rare, and no step waits for the last.
+        let (fours, rest) = inner.as_chunks::<4>();
+        for (i, four) in fours.iter().enumerate() {
+            let offs = [off(&four[0]), off(&four[1]), off(&four[2]), off(&four[3])];
+            if offs[0].max(offs[1]).max(offs[2].max(offs[3])) > farthest {
+                for (k, off) in offs.into_iter().enumerate() {
+                    if off > farthest {
+                        (best, farthest) = (4 * i + k, off);
+                    }
+                }
+            }
         }
-    }
-    best
-}
-
-/// Gives the point that two neighbours share to the closer one.
-fn share_out(points: &[ScanPoint], found: &mut [FoundLine], config: &FitConfig) {
-    for i in 1..found.len() {
-        let (left, right) = found.split_at_mut(i);
-        let (a, b) = (&mut left[i - 1], &mut right[0]);
-        if a.last() == b.first() {
-            let shared = &points[a.last()];
-            let loser = if a.fit.normalised(shared) <= b.fit.normalised(shared) { b } else { a };
-            loser.members.retain(|&m| points[m].beam != shared.beam);
-            loser.refit(points, config);
+        for (i, p) in rest.iter().enumerate() {
+            if off(p) > farthest {
+                (best, farthest) = (4 * fours.len() + i, off(p));
+            }
         }
-    }
-}
-
-/// Lets every line take the free points next to its ends that lie on it.
-fn extend(points: &[ScanPoint], run: &Range<usize>, found: &mut [FoundLine], config: &Config) {
-    let near =
-        |line: &FoundLine, i: usize| line.fit.normalised(&points[i]) <= config.split.chord_sds;
-    for i in 0..found.len() {
-        let from = if i == 0 { run.start } else { found[i - 1].last() + 1 };
-        let to = found.get(i + 1).map_or(run.end, FoundLine::first);
-        let line = &mut found[i];
-        let count = line.members.len();
-        while line.first() > from && near(line, line.first() - 1) {
-            line.members.insert(0, line.first() - 1);
-        }
-        while line.last() + 1 < to && near(line, line.last() + 1) {
-            line.members.push(line.last() + 1);
-        }
-        if line.members.len() > count {
-            line.refit(points, &config.fit);
-        }
-    }
-}
-
-/// Joins neighbours that one line explains, stray points between them included if they lie on it.
-fn merge(points: &[ScanPoint], found: &mut Vec<FoundLine>, config: &Config) {
-    let split = &config.split;
-    let mut i = 0;
-    while i + 1 < found.len() {
-        let (a, b) = (&found[i], &found[i + 1]);
-        let strays = a.last() + 1..b.first();
-        if strays.len() > split.stray_points || !may_be_one(a, b, points, split) {
-            i += 1;
-            continue;
-        }
-        let Some(mut union) = union(points, a, b, config) else {
-            i += 1;
-            continue;
-        };
-        let at = union.members.partition_point(|m| *m < strays.start);
-        let on: Vec<usize> =
-            strays.filter(|&s| union.fit.normalised(&points[s]) <= split.residual_sds).collect();
-        union.members.splice(at..at, on);
-        union.refit(points, &config.fit);
-        found[i] = union;
-        found.remove(i + 1);
-        // The longer line may now also explain its predecessor.
-        i = i.saturating_sub(1);
-    }
-}
-
-/// The one line of both, if it explains them; an end point that alone stands against it (the last
-/// of a run may well be another surface's first) is left out.
-fn union(points: &[ScanPoint], a: &FoundLine, b: &FoundLine, config: &Config) -> Option<FoundLine> {
-    let members: Vec<usize> = a.members.iter().chain(&b.members).copied().collect();
-    let mut union = FoundLine::new(points, members, &config.fit)?;
-    if config.split.confirms_union(&union.fit) {
-        return Some(union);
-    }
-    let off = |m: usize| union.fit.normalised(&points[m]);
-    if off(union.first()) >= off(union.last()) {
-        union.members.remove(0);
+        let at = run.start + 1 + best;
+        (at, farthest * farthest / cloud.points[at].variance(&n))
     } else {
-        union.members.pop();
+        for (i, p) in inner.iter().enumerate() {
+            let off_sq = (p - a).norm_squared();
+            if off_sq > farthest {
+                (best, farthest) = (i, off_sq);
+            }
+        }
+        let at = run.start + 1 + best;
+        let point = &cloud.points[at];
+        (at, farthest / (point.variance_along + point.variance_across))
     }
-    let union = FoundLine::new(points, union.members, &config.fit)?;
-    config.split.confirms_union(&union.fit).then_some(union)
+}
+
+/// The guess of a stretch but for its strays.
+pub(super) fn guess_without(
+    cloud: &Cloud,
+    points: &Range<usize>,
+    stray: &[bool],
+    strays: usize,
+) -> Guess {
+    let mut sums = cloud.sums(points);
+    if strays > 0 {
+        for at in points.clone().filter(|at| stray[*at]) {
+            sums = sums.without(&cloud.sums(&(at..at + 1)));
+        }
+    }
+    sums.guess()
 }
 
 /// The gate of two lines, compared about a point between them.
-fn may_be_one(a: &FoundLine, b: &FoundLine, points: &[ScanPoint], config: &SplitConfig) -> bool {
-    let anchor = (points[a.last()].at + points[b.first()].at) * 0.5;
-    let anchored = |fit: &LineFit| {
-        let j = Matrix2::new(1.0, -fit.tangent.dot(&anchor), 0.0, 1.0);
-        (-fit.residual(&anchor), fit.line.covariance.transformed(&j))
-    };
-    let ((da, ca), (db, cb)) = (anchored(&a.fit), anchored(&b.fit));
-    let turn = difference(a.fit.line.line.alpha(), b.fit.line.line.alpha());
-    let (offset_sd, turn_sd) = config.model_sd;
-    let model = Covariance::from_variances([offset_sd * offset_sd, turn_sd * turn_sd]);
-    mahalanobis_sq(&Vector2::new(da - db, turn), &(ca + cb + model)) < config.merge_gate
-}
-
-/// Points at the seam of two lines go to the closer one.
-fn contest(points: &[ScanPoint], found: &mut [FoundLine], config: &FitConfig) {
-    for i in 1..found.len() {
-        let (left, right) = found.split_at_mut(i);
-        let (a, b) = (&mut left[i - 1], &mut right[0]);
-        if a.last() + 1 != b.first() {
-            continue;
-        }
-        let closer = |m: usize, this: &FoundLine, than: &FoundLine| {
-            this.fit.normalised(&points[m]) < than.fit.normalised(&points[m])
-        };
-        let to_b = a.members.iter().rev().take_while(|m| closer(**m, b, a)).count();
-        let to_b = to_b.min(a.members.len().saturating_sub(3));
-        if to_b > 0 {
-            let moving = a.members.split_off(a.members.len() - to_b);
-            b.members.splice(0..0, moving);
-        } else {
-            let to_a = b.members.iter().take_while(|m| closer(**m, a, b)).count();
-            let to_a = to_a.min(b.members.len().saturating_sub(3));
-            a.members.extend(b.members.drain(..to_a));
-        }
-        a.refit(points, config);
-        b.refit(points, config);
+fn may_be_one(a: &Piece, b: &Piece, cloud: &Cloud, config: &Config) -> bool {
+    let split = &config.split;
+    let anchor = (cloud.at[a.points.end - 1] + cloud.at[b.points.start]) * 0.5;
+    let (offset_sd, turn_sd) = split.model_sd;
+    // Covariance of (offset at the anchor, turn), both lines and what walls are.
+    let (mut rr, mut ra, mut aa) = (offset_sd * offset_sd, 0.0, turn_sd * turn_sd);
+    for piece in [a, b] {
+        let guess = &piece.guess;
+        // The weights knew of the range alone; what they make of it across the line is seen at
+        // three points.
+        let ends = [
+            piece.points.start,
+            piece.points.start.midpoint(piece.points.end - 1),
+            piece.points.end - 1,
+        ];
+        let across: f64 = ends
+            .iter()
+            .map(|at| cloud.points[*at].variance(&guess.normal) / cloud.points[*at].variance_along)
+            .sum::<f64>()
+            / 3.0;
+        let floor = config.fit.systematic_sd * config.fit.systematic_sd;
+        let half = 0.5 * (cloud.at[ends[2]] - cloud.at[ends[0]]).norm();
+        let tilt = across / guess.along() + floor / (3.0 * half * half);
+        let arm = guess.tangent.dot(&(guess.centre - anchor));
+        rr += across / guess.weight + floor + arm * arm * tilt;
+        ra += arm * tilt;
+        aa += tilt;
     }
-}
-
-fn chi_sq_below(fit: &LineFit, z: f64) -> bool {
-    fit.chi_sq <= chi_square_quantile(fit.count.saturating_sub(2), z)
-}
-
-/// Quantile of the chi-square distribution (Wilson and Hilferty, 1931): within 2 % from three
-/// degrees of freedom on.
-fn chi_square_quantile(dof: usize, z: f64) -> f64 {
-    let k = dof.max(1) as f64;
-    let h = 2.0 / (9.0 * k);
-    k * (1.0 - h + z * h.sqrt()).powi(3)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn quantiles_are_close_to_the_published_ones() {
-        for (dof, published) in [(3, 16.266), (4, 18.467), (10, 29.588), (30, 59.703)] {
-            let q = chi_square_quantile(dof, 3.0902);
-            assert!((q / published - 1.0).abs() < 0.02, "{dof}: {q}");
-        }
-    }
+    let turn = b.guess.normal.perp(&a.guess.normal);
+    let apart = b.guess.residual(&anchor) - a.guess.residual(&anchor);
+    let determinant = rr * aa - ra * ra;
+    // Lines that face apart are never one.
+    a.guess.normal.dot(&b.guess.normal) > 0.0
+        && aa * apart * apart - 2.0 * ra * apart * turn + rr * turn * turn
+            < split.merge_gate * determinant
 }

@@ -9,7 +9,7 @@ use super::{Scanner, Surveyor};
 use crate::emulation::{self, Chance};
 use crate::evidence::{scanner_evidence, sonar_evidence};
 use crate::log::{Observation, Reading};
-use crate::perception::{BeamState, extract_corrected, extract_plausible, plausibility};
+use crate::perception::BeamState;
 use crate::sensor::{MountedAt, Ring, Scan};
 
 /// One contribution before it is sent.
@@ -47,20 +47,14 @@ pub(super) fn fill(surveyor: &mut Surveyor, reading: &Reading, look: &mut Contri
 
 /// Walls, clusters and evidence of a scan.
 fn see(surveyor: &mut Surveyor, scan: &Scan, look: &mut Contribution) {
-    let Some(Scanner { profile, perception, corrector, evidence }) = &mut surveyor.scanner else {
-        return;
-    };
+    let Some(scanner) = &mut surveyor.scanner else { return };
+    let Scanner { profile, extractor, evidence } = scanner.as_mut();
     let mounted = mounted(scan, &profile.mount);
     let scan = mounted.as_ref().unwrap_or(scan);
-    let states = plausibility::judge(scan, &perception.plausibility);
-    let corrected = corrector.as_mut().map(|corrector| corrector.correct(scan, &states));
-    let (scan, states, features) = match &corrected {
-        Some(corrected) => {
-            let features = extract_corrected(corrected, perception);
-            (&corrected.scan, &corrected.states, features)
-        }
-        None => (scan, &states, extract_plausible(scan, &states, perception)),
-    };
+    let features = extractor.extract(scan);
+    look.segments.clone_from(&features.segments);
+    look.clusters.clone_from(&features.clusters);
+    let (scan, states) = (extractor.corrected_scan().unwrap_or(scan), extractor.states());
     let usable: Vec<bool> = states.iter().map(|s| *s == BeamState::Hit).collect();
     let patch = scanner_evidence(
         scan,
@@ -71,8 +65,6 @@ fn see(surveyor: &mut Surveyor, scan: &Scan, look: &mut Contribution) {
         evidence,
         &mut surveyor.canvas,
     );
-    look.segments = features.segments;
-    look.clusters = features.clusters;
     look.evidence.extend((!patch.tiles.is_empty()).then_some(patch));
 }
 

@@ -5,30 +5,42 @@ use super::Point;
 /// The convex hull, counter-clockwise from the lowest-leftmost point, without collinear points
 /// (Andrew's monotone chain, O(n log n)). One or two distinct points give themselves.
 pub fn convex_hull(points: &[Point]) -> Vec<Point> {
-    // Adding 0 makes -0 into 0: two names of one coordinate would sort apart and lose points.
-    let mut sorted: Vec<Point> = points.iter().map(|p| p.add_scalar(0.0)).collect();
-    sorted.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    sorted.dedup();
-    if sorted.len() < 3 {
-        return sorted;
-    }
-    let mut hull: Vec<Point> = Vec::with_capacity(2 * sorted.len());
-    for half in 0..2 {
-        let start = hull.len();
-        let chain: &mut dyn Iterator<Item = &Point> =
-            if half == 0 { &mut sorted.iter() } else { &mut sorted.iter().rev() };
-        for p in chain {
-            while hull.len() >= start + 2
-                && (hull[hull.len() - 1] - hull[hull.len() - 2]).perp(&(p - hull[hull.len() - 1]))
-                    <= 0.0
-            {
-                hull.pop();
-            }
-            hull.push(*p);
-        }
-        hull.pop();
-    }
+    let mut hull = Vec::new();
+    convex_hull_into(&mut points.to_vec(), &mut hull);
     hull
+}
+
+/// The convex hull of `points`, which are left sorted, in place of what `hull` holds.
+pub fn convex_hull_into(points: &mut Vec<Point>, hull: &mut Vec<Point>) {
+    hull.clear();
+    for p in points.iter_mut() {
+        // Adding 0 makes -0 into 0: two names of one coordinate would sort apart and lose points.
+        *p = p.add_scalar(0.0);
+    }
+    // Equal points are the same bits: a sort that is not stable gives the same order.
+    points.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    points.dedup();
+    if points.len() < 3 {
+        hull.extend_from_slice(points);
+        return;
+    }
+    half_hull(points.iter(), hull);
+    half_hull(points.iter().rev(), hull);
+}
+
+/// One half of the hull: the turns to the left, without the last point.
+fn half_hull<'a>(points: impl Iterator<Item = &'a Point>, hull: &mut Vec<Point>) {
+    let start = hull.len();
+    for p in points {
+        while hull.len() >= start + 2
+            && (hull[hull.len() - 1] - hull[hull.len() - 2]).perp(&(p - hull[hull.len() - 1]))
+                <= 0.0
+        {
+            hull.pop();
+        }
+        hull.push(*p);
+    }
+    hull.pop();
 }
 
 /// Distance of `p` from a convex counter-clockwise hull; 0 inside. Infinite for an empty hull.

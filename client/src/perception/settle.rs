@@ -1,0 +1,133 @@
+//! From a stretch of points that may be a line to the line, if it is one: fitted clear of where it
+//! meets its neighbours, rid of what strays from it at either end, and neither too short nor round.
+
+use std::ops::Range;
+
+use super::Config;
+use super::cloud::Cloud;
+use super::fit::{LineFit, fit_from};
+use super::guess::Guess;
+use super::points::ScanPoint;
+use super::split::{FoundLine, Piece, SplitConfig, Splitter, guess_without};
+
+/// Most fits of one line, each with fewer points than the one before.
+const TRIMS_MAX: usize = 4;
+
+impl Splitter {
+    /// The line of a piece, if it is one.
+    pub(super) fn settled(
+        &self,
+        cloud: &Cloud,
+        piece: &Piece,
+        clear: Range<usize>,
+        fewest: usize,
+        config: &Config,
+    ) -> Option<FoundLine> {
+        let split = &config.split;
+        let mut points = piece.points.clone();
+        // What is fitted: the points that are clear of the seams.
+        let mut clear = clear;
+        let mut guess = if clear == points {
+            piece.guess
+        } else {
+            guess_without(cloud, &clear, &self.stray, piece.strays)
+        };
+        for trims_left in (0..TRIMS_MAX).rev() {
+            if points.len() < fewest + piece.strays || clear.len() < 3 + piece.strays {
+                return None;
+            }
+            let fit = self.fitted(cloud, &clear, piece.strays, &guess, config)?;
+            // Up to a third of the points at either end may be another surface's.
+            let looked_at = (clear.len() / 3).min(split.astray_points_max);
+            let own = || cloud.points[clear.clone()].iter();
+            let first = fit.astray(own().take(looked_at), split.astray_sds);
+            let last = fit.astray(own().rev().take(looked_at), split.astray_sds);
+            if (first == 0 && last == 0) || trims_left == 0 {
+                let fit = fit.spanning(&cloud.at[points.start], &cloud.at[points.end - 1]);
+                let good = fit.length() >= split.length_min
+                    && fit.rms() <= split.rms_max
+                    && fit.line.covariance.matrix()[(1, 1)] <= split.direction_sd_max.powi(2)
+                    && !is_round(&fit, own(), split);
+                return good.then_some(FoundLine { points, fit });
+            }
+            clear = clear.start + first..clear.end - last;
+            // What lies beyond what strays from the line does not return to it.
+            if first > 0 {
+                points.start = clear.start;
+            }
+            if last > 0 {
+                points.end = clear.end;
+            }
+            guess = guess_without(cloud, &clear, &self.stray, piece.strays);
+        }
+        None
+    }
+
+    fn fitted(
+        &self,
+        cloud: &Cloud,
+        range: &Range<usize>,
+        strays: usize,
+        guess: &Guess,
+        config: &Config,
+    ) -> Option<LineFit> {
+        let points = &cloud.points[range.clone()];
+        if strays == 0 {
+            return fit_from(&points.iter(), guess, &config.fit).ok();
+        }
+        let stray = &self.stray[range.clone()];
+        let own = points.iter().zip(stray).filter_map(|(p, stray)| (!stray).then_some(p));
+        fit_from(&own, guess, &config.fit).ok()
+    }
+}
+
+/// Whether a short line is the side of something round.
+fn is_round<'a>(
+    fit: &LineFit,
+    points: impl Iterator<Item = &'a ScanPoint>,
+    split: &SplitConfig,
+) -> bool {
+    let length = fit.length();
+    length <= split.bow_length_max && {
+        let (bow, sd) = fit.bow(points);
+        let bows = bow > split.bow_max * length && bow > split.bow_sds * sd;
+        let might = length < split.plain_length && bow + 2.0 * sd > split.bow_doubt * length;
+        bows || might
+    }
+}
+
+/// The points of a piece that are clear of where it meets its neighbours. Near there, points
+/// went to the closer line, which takes from each those that err towards the other; where along
+/// the line they are does not depend on how far off it they err.
+pub(super) fn clear_of_seams(
+    cloud: &Cloud,
+    piece: &Piece,
+    [before, after]: [Option<&Piece>; 2],
+    config: &Config,
+) -> Range<usize> {
+    let split = &config.split;
+    let Range { mut start, mut end } = piece.points;
+    // At least half of the points are left.
+    let (start_max, end_min) = (start + piece.points.len() / 4, end - piece.points.len() / 4);
+    let meet = |other: &Piece| {
+        let (a, b) = (&piece.guess, &other.guess);
+        let sine = a.normal.perp(&b.normal);
+        // Along the own tangent from the own foot point.
+        (sine.abs() > 0.2).then(|| (b.rho - a.rho * a.normal.dot(&b.normal)) / sine)
+    };
+    let along = |at: usize| piece.guess.tangent.dot(&cloud.at[at]);
+    let margin = |at: usize| split.seam_sds * cloud.points[at].variance_along.sqrt();
+    let before = before.filter(|b| b.points.end + split.stray_points >= start);
+    if let Some(t) = before.and_then(meet) {
+        while start < start_max && along(start) < t + margin(start) {
+            start += 1;
+        }
+    }
+    let after = after.filter(|a| a.points.start <= end + split.stray_points);
+    if let Some(t) = after.and_then(meet) {
+        while end > end_min && along(end - 1) > t - margin(end - 1) {
+            end -= 1;
+        }
+    }
+    start..end
+}
