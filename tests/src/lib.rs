@@ -15,6 +15,8 @@
 //! * [`programs`], [`database`], [`server`], [`robot`], [`fleet`], [`meter`], [`api`], [`level`]: the real
 //!   programs, the network between them, and what they answer.
 //! * [`trial`]: a log played as a fleet into a fresh server, and what came of it.
+//! * [`extraction`], [`yardstick`]: how well and how fast lines are found in scans, beside the least code that
+//!   finds lines.
 //! * [`range`]: simulated heads, their calibration, and how well their ranges are corrected.
 //! * [`figure`]: a hallway's map as a picture.
 //! * [`evaluation`], [`speed`], [`report`]: `mapfold-evaluate`, which writes tables between markers
@@ -26,6 +28,7 @@ pub mod coverage;
 pub mod database;
 pub mod error;
 pub mod evaluation;
+pub mod extraction;
 pub mod figure;
 pub mod fleet;
 pub mod floor;
@@ -42,5 +45,6 @@ pub mod server;
 pub mod simulation;
 pub mod speed;
 pub mod trial;
+pub mod yardstick;
 
 pub use error::Error;

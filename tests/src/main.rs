@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use mapfold_tests::{evaluation, figure, growth, honesty, range, speed};
+use mapfold_tests::{evaluation, extraction, figure, growth, honesty, range, speed};
 
 /// Measures Mapfold and rewrites the tables of a report between their markers.
 #[derive(Debug, Parser)]
@@ -57,6 +57,15 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
     },
+    /// Finds lines in simulated scans of which every wall is known, beside a bare loop
+    Extraction {
+        /// The page with the markers `extraction`, `lines` and `labelled`
+        #[arg(long, value_name = "FILE")]
+        report: PathBuf,
+        /// A folder with a map whose lines people drew, `plans/aria/columbia.map`
+        #[arg(long, value_name = "DIR")]
+        data: Option<PathBuf>,
+    },
     /// Gathers the figures that Criterion has left in the target folder
     Benches {
         /// The page with the markers `benches`
@@ -77,6 +86,7 @@ async fn main() -> ExitCode {
         Command::Range { report } => range::evaluate(&report, &range::FULL),
         Command::Honesty { report } => honesty::table(&report),
         Command::Growth { report, data } => growth::tables(&report, data.as_deref()),
+        Command::Extraction { report, data } => extraction::extraction(&report, data.as_deref()),
         Command::Figure { out } => figure::write(&out).await.map(|()| Vec::new()),
         Command::Benches { report, criterion } => speed::benches(&report, &criterion),
     };

@@ -56,6 +56,12 @@ impl Piece {
         self.a.distance(self.b)
     }
 
+    /// The point at this share of the way from `a` to `b`.
+    pub fn at(&self, share: f64) -> Point {
+        let along = self.a.to(self.b);
+        Point::new(self.a.x + share * along.x, self.a.y + share * along.y)
+    }
+
     /// Metres from a point to the nearest point of the piece.
     pub fn distance(&self, point: Point) -> f64 {
         let along = self.a.to(self.b);
@@ -65,7 +71,7 @@ impl Piece {
         } else {
             0.0
         };
-        point.distance(Point::new(self.a.x + share * along.x, self.a.y + share * along.y))
+        point.distance(self.at(share))
     }
 
     /// Where this piece crosses `other`: the share of its own length from `a`, if it does.

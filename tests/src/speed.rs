@@ -10,6 +10,8 @@ use crate::{Error, report};
 #[derive(Debug, Deserialize)]
 struct Estimates {
     mean: Estimate,
+    /// Not moved by what else ran for a moment.
+    median: Estimate,
 }
 
 #[derive(Debug, Deserialize)]
@@ -24,7 +26,8 @@ struct Interval {
     upper_bound: f64,
 }
 
-/// Rewrites the table `benches` of the report from Criterion's folder; answers what is missing.
+/// Rewrites the tables `benches` and `ratios` of the report from Criterion's folder; answers what is
+/// missing.
 ///
 /// # Errors
 /// A file that cannot be read or written.
@@ -37,16 +40,48 @@ pub fn benches(page: &Path, criterion: &Path) -> Result<Vec<String>, Error> {
     rows.sort();
     let header = ["benchmark", "mean", "95 % from", "to"];
     report::rewrite(page, "benches", &report::table(&header, &rows))?;
-    Ok(Vec::new())
+    beside_the_bare_loop(page, criterion)
+}
+
+/// Rewrites the table `ratios`: what extraction costs in times of the bare loop.
+fn beside_the_bare_loop(page: &Path, criterion: &Path) -> Result<Vec<String>, Error> {
+    let mut rows = Vec::new();
+    let mut faults = Vec::new();
+    for beams in ["361", "682", "1081"] {
+        let median = |name: &str| {
+            let folder = criterion.join("lines").join(name).join(beams);
+            Ok(latest(&folder)?.map(|estimates| estimates.median.point_estimate))
+        };
+        let (Some(bare), Some(plain), Some(with_table)) =
+            (median("bare loop")?, median("Mapfold")?, median("Mapfold with a table")?)
+        else {
+            faults.push(format!("no figures of extraction with {beams} beams"));
+            continue;
+        };
+        let ratio = |own: f64| format!("{:.2}", own / bare);
+        let times = [bare, plain, with_table].map(time);
+        rows.push([&[beams.to_owned()], &times[..], &[ratio(plain), ratio(with_table)]].concat());
+    }
+    let header = ["beams", "bare loop", "Mapfold", "with a table", "ratio", "ratio with a table"];
+    report::rewrite(page, "ratios", &report::table(&header, &rows))?;
+    Ok(faults)
+}
+
+/// What Criterion last wrote into a benchmark's folder, if anything.
+fn latest(folder: &Path) -> Result<Option<Estimates>, Error> {
+    let file = folder.join("new/estimates.json");
+    if !file.is_file() {
+        return Ok(None);
+    }
+    let text = std::fs::read(&file).map_err(|e| Error::file(&file, e))?;
+    let estimates =
+        serde_json::from_slice(&text).map_err(|e| Error::file(&file, std::io::Error::other(e)))?;
+    Ok(Some(estimates))
 }
 
 /// Criterion nests folders by group, function and parameter; the latest figures are in `new`.
 fn gather(root: &Path, folder: &Path, rows: &mut Vec<Vec<String>>) -> Result<(), Error> {
-    let latest = folder.join("new/estimates.json");
-    if latest.is_file() {
-        let text = std::fs::read(&latest).map_err(|e| Error::file(&latest, e))?;
-        let estimates: Estimates = serde_json::from_slice(&text)
-            .map_err(|e| Error::file(&latest, std::io::Error::other(e)))?;
+    if let Some(estimates) = latest(folder)? {
         let name = folder.strip_prefix(root).unwrap_or(folder).display().to_string();
         let Estimate { point_estimate, confidence_interval } = estimates.mean;
         let Interval { lower_bound, upper_bound } = confidence_interval;
@@ -81,16 +116,30 @@ mod tests {
     fn figures_are_found_in_nested_folders_and_written_in_readable_units() {
         let folder = tempfile::tempdir().expect("a folder");
         let criterion = folder.path().join("criterion");
-        let place = criterion.join("fold/one look/new");
-        std::fs::create_dir_all(&place).expect("folders");
-        let figures = r#"{"mean":{"confidence_interval":{"confidence_level":0.95,
-            "lower_bound":1500.0,"upper_bound":2.5e6},"point_estimate":2.0e9,"standard_error":1.0}}"#;
-        std::fs::write(place.join("estimates.json"), figures).expect("figures");
+        let write = |name: &str, nanoseconds: &str| {
+            let place = criterion.join(name).join("new");
+            std::fs::create_dir_all(&place).expect("folders");
+            let figures = r#"{"confidence_interval":{"confidence_level":0.95,
+                "lower_bound":1500.0,"upper_bound":2.5e6},"point_estimate":MEAN,"standard_error":1.0}"#
+                .replace("MEAN", nanoseconds);
+            let figures = format!(r#"{{"mean":{figures},"median":{figures}}}"#);
+            std::fs::write(place.join("estimates.json"), figures).expect("figures");
+        };
+        write("fold/one look", "2.0e9");
+        for beams in ["361", "682", "1081"] {
+            write(&format!("lines/bare loop/{beams}"), "10000.0");
+            write(&format!("lines/Mapfold/{beams}"), "19000.0");
+            write(&format!("lines/Mapfold with a table/{beams}"), "25000.0");
+        }
         let page = folder.path().join("page.md");
-        std::fs::write(&page, "<!-- begin: benches -->\n<!-- end: benches -->\n").expect("a page");
+        let markers = ["benches", "ratios"]
+            .map(|name| format!("<!-- begin: {name} -->\n<!-- end: {name} -->\n"));
+        std::fs::write(&page, markers.concat()).expect("a page");
         assert!(benches(&page, &criterion).expect("a table").is_empty());
         let text = std::fs::read_to_string(&page).expect("the page");
         assert!(text.contains("| fold/one look | 2.000 s | 1.500 µs | 2.500 ms |"), "{text}");
+        let ratios = "| 361 | 10.000 µs | 19.000 µs | 25.000 µs | 1.90 | 2.50 |";
+        assert!(text.contains(ratios), "{text}");
         assert_eq!(benches(&page, &folder.path().join("nothing")).expect("an answer").len(), 1);
     }
 }
