@@ -94,7 +94,14 @@ pub fn judge_into(
         (r0 - r > step && r - r1 > step) || (r - r0 > step && r1 - r > step)
     };
     let closed = scan.is_full_circle();
-    let veils = Veils { ranges: &scan.ranges, directions, closed, config };
+    let veils = Veils {
+        ranges: &scan.ranges,
+        directions,
+        closed,
+        narrow: config.veil_angle.tan(),
+        slight: config.continuation_angle.tan(),
+        range_sd: config.range_sd,
+    };
     for (i, three) in scan.ranges.windows(3).enumerate() {
         if between(three[0], three[1], three[2]) && veils.holds(states, i + 1) {
             states[i + 1] = BeamState::Mixed;
@@ -115,7 +122,10 @@ struct Veils<'a> {
     ranges: &'a [f64],
     directions: &'a [Point],
     closed: bool,
-    config: &'a PlausibilityConfig,
+    /// Tangent of the veil angle, and of the continuation angle.
+    narrow: f64,
+    slight: f64,
+    range_sd: f64,
 }
 
 impl Veils<'_> {
@@ -135,21 +145,19 @@ impl Veils<'_> {
             return false;
         };
         let direction = self.directions[beam];
-        let narrow = self.config.veil_angle.tan();
-        let along_beam = |q: &Point| turns_less(&(q - p), &direction, narrow);
+        let along_beam = |q: &Point| turns_less(&(q - p), &direction, self.narrow);
         if !along_beam(&before) || !along_beam(&after) {
             return false;
         }
         // A wall at a grazing angle looks the same to three beams; five tell.
-        let slight = self.config.continuation_angle.tan();
         let continues = |near: Point, far: Option<Point>| {
             far.is_some_and(|far| {
                 let (before, after) = (near - far, p - near);
                 // Ranges err along the beam, and across the wall by the sine of the angle between.
                 let length = after.norm();
                 let sine = (after.perp(&direction) / length).abs();
-                let sd = self.config.range_sd * sine * (6f64.sqrt() / before.norm().min(length));
-                turns_less(&before, &after, slight + 3.0 * sd)
+                let sd = self.range_sd * sine * (6f64.sqrt() / before.norm().min(length));
+                turns_less(&before, &after, self.slight + 3.0 * sd)
             })
         };
         !(continues(before, point(-2)) || continues(after, point(2)))
