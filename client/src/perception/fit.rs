@@ -2,7 +2,7 @@
 //!
 //! Closed form for given weights (`N = -2 S_xy`, `D = S_yy - S_xx`, `alpha = atan2(N, D) / 2`,
 //! `rho = n . c`): a first pass weighs every point by its range variance and needs sums only, which
-//! for a stretch of a scan are differences of running sums and cost nothing ([`super::guess`]); the
+//! for a stretch of a scan are differences of running sums and cost nothing (`guess`); the
 //! next weigh it by its variance across the line found, until that no longer turns. The covariance
 //! sums the points' own covariances through the Jacobians of the closed form,
 //!
