@@ -183,7 +183,13 @@ mod tests {
                 (1.0 / bearing.sin().abs()).min(ahead / bearing.cos().max(1e-9))
             })
             .collect();
-        Scan { geometry, ranges, range_max: 50.0, robot_from_sensor: Pose::identity() }
+        Scan {
+            geometry,
+            ranges,
+            range_max: 50.0,
+            robot_from_sensor: Pose::identity(),
+            repeats: Vec::new(),
+        }
     }
 
     fn heard(scan: &Scan, seed: u64) -> Vec<(f64, Option<f64>)> {

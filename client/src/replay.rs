@@ -24,6 +24,7 @@ use tokio::sync::watch;
 use tokio::time::Instant;
 
 use crate::log::carmen;
+use crate::robot::at_rest::{self, AtRestConfig};
 use crate::robot::{OdometryNoise, PoseSd, PoseSource, Surveyor, SurveyorConfig, SurveyorError};
 use crate::sensor::Sensors;
 use crate::sync::{
@@ -182,7 +183,12 @@ pub async fn run(
         return Err(ReplayError::Speed(speed));
     }
     let path = options.log.clone();
-    let log = worker(move || carmen::read(path)).await??;
+    let log = worker(move || {
+        let mut log = carmen::read(path)?;
+        log.readings = at_rest::settle(log.readings, &AtRestConfig::STANDARD);
+        Ok::<_, carmen::ReadError>(log)
+    })
+    .await??;
     progress.send_modify(|p| p.damage = log.summary.damage());
     let sensors = options.sensors.choose(&log)?;
     let window = options.window;

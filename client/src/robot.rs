@@ -4,6 +4,7 @@
 //! log does. What it makes depends on the readings and its settings alone, ids included: surveying
 //! the same log twice gives the same contributions bit for bit.
 
+pub mod at_rest;
 mod identity;
 mod look;
 mod odometry;

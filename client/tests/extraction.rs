@@ -388,7 +388,13 @@ fn nonsense_gives_nothing_and_no_panic() {
         vec![3.0],
         vec![3.0, 3.0],
     ] {
-        let scan = Scan { geometry, ranges, range_max: 30.0, robot_from_sensor: Pose::identity() };
+        let scan = Scan {
+            geometry,
+            ranges,
+            range_max: 30.0,
+            robot_from_sensor: Pose::identity(),
+            repeats: Vec::new(),
+        };
         let found = perception::extract(&scan, &config());
         assert!(found.segments.is_empty() && found.clusters.is_empty());
         assert_eq!(found.beams.len(), scan.ranges.len());

@@ -72,6 +72,31 @@ async fn a_replay_makes_what_is_missing_and_delivers_every_scan_once() {
 }
 
 #[tokio::test]
+async fn all_scans_of_a_stop_are_one_contribution() {
+    let (server, folder) = (Server::start(TOKEN).await, tempfile::tempdir().unwrap());
+    let log = folder.path().join("stop.log");
+    // Three scans on the way, five at rest, two on the way.
+    let places = [0.0, 0.5, 1.0, 1.5, 1.5, 1.5, 1.5, 1.5, 2.0, 2.5];
+    let ranges = vec!["3.0"; 180].join(" ");
+    let line = |(i, x): (usize, &f64)| {
+        format!("FLASER 180 {ranges} {x} 0 0 {x} 0 0 {}.5 robot {i}.5\n", 100 + i)
+    };
+    std::fs::write(&log, places.iter().enumerate().map(line).collect::<String>()).unwrap();
+    let options =
+        ReplayOptions { log, window: Window::default(), ..options(&folder.path().join("outbox")) };
+    let report = play(options, &server.url, TOKEN).await.unwrap();
+    assert!(report.complete, "{report:?}");
+    assert_eq!((report.readings, report.acknowledged), (6, 6));
+    let world = server.world.lock().unwrap();
+    let mut seen: Vec<(f64, &str)> =
+        world.contributions.values().map(|c| (c.pose.x_m, c.observed_at.as_str())).collect();
+    seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let places: Vec<f64> = seen.iter().map(|(x, _)| *x).collect();
+    assert_eq!(places, [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]);
+    assert!(seen[3].1.starts_with("1970-01-01T00:01:47.5"), "{}", seen[3].1);
+}
+
+#[tokio::test]
 async fn a_server_that_is_busy_or_loses_answers_gets_everything_once() {
     let (server, folder) = (Server::start(TOKEN).await, tempfile::tempdir().unwrap());
     {

@@ -205,6 +205,7 @@ impl Fleet {
             },
             ranges,
             range_max: self.scanner.cap_m,
+            repeats: Vec::new(),
             robot_from_sensor: Pose::identity(),
         };
         extract(&scan, &self.perception).segments

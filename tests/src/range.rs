@@ -10,7 +10,7 @@ mod sweeps;
 use std::path::Path;
 
 pub use errors::{Errors, worst_bin};
-pub use sweeps::{Sample, Scene, calibrated, line_errors, samples};
+pub use sweeps::{AT_REST, Sample, Scene, calibrated, line_errors, samples};
 
 use crate::simulation::{IrHead, Noise};
 use crate::{Error, report};
@@ -40,6 +40,9 @@ const BIN_READINGS_MIN: usize = 3000;
 
 /// 99 of 100 corrected ranges of the design's walls are better than this, metres.
 pub const P99_MAX_M: f64 = 0.045;
+/// At every incidence up to [`STEEPEST_DEG`], 99 of 100 corrected ranges of a robot at rest
+/// ([`AT_REST`] sweeps) are better than [`P99_MAX_M`] as well; those of a single sweep cannot be where noise
+/// alone is not.
 /// The bias of a bin is less, metres.
 pub const BIAS_MAX_M: f64 = 0.003;
 /// At every incidence, the p99 of corrected ranges is less than so many times that of noise alone:
@@ -82,7 +85,7 @@ pub fn evaluate(page: &Path, effort: &Effort) -> Result<Vec<String>, Error> {
         all.sector.push(of(Scene::Sector).map_err(fault)?);
         all.walls.extend(of(Scene::Wall).map_err(fault)?);
         all.corners.extend(of(Scene::Corner).map_err(fault)?);
-        let lines = line_errors(&head, &done, effort.sweeps, &mut noise);
+        let lines = line_errors(&head, &done, effort.sweeps, false, &mut noise);
         all.lines.push(lines.map_err(fault)?);
     }
     let text = std::fs::read_to_string(page).map_err(|e| Error::file(page, e))?;
@@ -103,6 +106,17 @@ fn three(samples: &[Sample]) -> [Errors; 3] {
         Errors::of(samples.iter().filter_map(|s| s.in_situ)),
         Errors::of(samples.iter().map(|s| noise.normal(s.noise_sd))),
     ]
+}
+
+/// Errors of the means of a robot at rest.
+fn at_rest(samples: &[Sample]) -> Errors {
+    Errors::of(samples.iter().filter_map(|s| s.at_rest))
+}
+
+/// Mean square of the errors of a robot at rest over what is claimed: 1 if the claims are right.
+fn honesty_at_rest(samples: &[Sample]) -> f64 {
+    let errors = samples.iter().filter_map(|s| s.at_rest.map(|e| (e / s.claimed_at_rest).powi(2)));
+    Errors::of(errors).bias
 }
 
 impl Measured {
@@ -131,6 +145,11 @@ impl Measured {
             }
         }
         for (from, to, of) in self.bands() {
+            let at_rest = at_rest(&of);
+            if at_rest.p99 > P99_MAX_M {
+                let p99 = mm(at_rest.p99);
+                faults.push(format!("{from} to {to} degrees: p99 at rest is {p99} mm"));
+            }
             let [_, corrected, noise] = three(&of);
             if corrected.p99 > OVER_NOISE_MAX * noise.p99 {
                 let (p99, noise) = (mm(corrected.p99), mm(noise.p99));
@@ -203,8 +222,10 @@ impl Measured {
             let [raw, corrected, noise] = three(&of);
             let worst = worst_bin(&of, BIN_READINGS_MIN)
                 .map_or_else(String::new, |(d, _, e)| format!("{} at {d:.2} m", mm(e.bias)));
+            let rest = at_rest(&of);
             let cells = [raw.p99, corrected.bias, corrected.p99, noise.p99].map(mm);
-            [vec![format!("{from:.0} to {to:.0}")], cells.to_vec(), vec![worst]].concat()
+            let stopped = vec![mm(rest.bias), mm(rest.p99), format!("{:.2}", honesty_at_rest(&of))];
+            [vec![format!("{from:.0} to {to:.0}")], cells.to_vec(), vec![worst], stopped].concat()
         };
         let rows: Vec<_> = self.bands().map(row).collect();
         let header = [
@@ -214,6 +235,9 @@ impl Measured {
             "p99 mm",
             "p99 of noise alone mm",
             "greatest bias of a bin mm",
+            "at rest: bias mm",
+            "at rest: p99 mm",
+            "at rest: mean square over claimed",
         ];
         report::table(&header, &rows)
     }
@@ -232,6 +256,7 @@ fn by_stage(samples: &[Sample]) -> String {
         row("as they come", raw),
         row("true incidence", known),
         row("incidence from the scan", corrected),
+        row("at rest", at_rest(samples)),
         row("noise alone", noise),
     ];
     let header = ["ranges", "readings", "% kept", "bias mm", "sd mm", "p99 mm", "max mm"];
@@ -249,11 +274,14 @@ mod tests {
             let head = IrHead::of_seed(seed);
             let mut noise = Noise::of_seed(seed);
             let done = calibrated(&head, 60, &mut noise).unwrap();
-            let (errors, others) = line_errors(&head, &done, 300, &mut noise).unwrap();
+            let (errors, others) = line_errors(&head, &done, 300, false, &mut noise).unwrap();
             let nees = Errors::of(errors.iter().copied()).bias;
             // 300 lines: the band is wider.
             assert!(nees < 2.25, "head {seed}: {nees}");
             assert!(others < 6, "head {seed}: {others} sweeps showed not just one line");
+            let (errors, others) = line_errors(&head, &done, 300, true, &mut noise).unwrap();
+            let nees = Errors::of(errors.iter().copied()).bias;
+            assert!(nees < 2.25 && others < 6, "head {seed}, at rest: {nees}, {others} others");
             sector.extend(samples(&head, &done, Scene::Sector, 400, &mut noise).unwrap());
             walls.extend(samples(&head, &done, Scene::Wall, 100, &mut noise).unwrap());
         }
@@ -267,6 +295,20 @@ mod tests {
         let claimed = walls.iter().filter_map(|s| s.in_situ.map(|e| (e / s.claimed).powi(2)));
         let honest = Errors::of(claimed).bias;
         assert!((0.8..1.15).contains(&honest), "mean square over claimed: {honest}");
+        for band in 0..7 {
+            let from = BIN.1 * f64::from(band);
+            let of: Vec<Sample> = walls
+                .iter()
+                .filter(|s| (from..from + BIN.1).contains(&s.incidence_deg))
+                .copied()
+                .collect();
+            let errors = at_rest(&of);
+            assert!(of.len() > 500, "{from} degrees: {} readings", of.len());
+            // Two heads and a thousand readings: the p99 is certain to some millimetres.
+            assert!(errors.p99 <= 1.1 * P99_MAX_M, "at rest, {from} degrees: {errors:?}");
+        }
+        let honest = honesty_at_rest(&walls);
+        assert!((0.7..1.15).contains(&honest), "at rest, mean square over claimed: {honest}");
         // The means of bins of 1500 readings are off by a millimetre themselves.
         let (d, beta, errors) = worst_bin(&sector, 1500).unwrap();
         assert!(errors.bias.abs() < BIAS_MAX_M, "{d} m, {beta} degrees: {errors:?}");

@@ -150,6 +150,7 @@ impl Corrector {
         into.scan.range_max = scan.range_max;
         into.scan.robot_from_sensor = scan.robot_from_sensor;
         into.scan.ranges.clone_from(&scan.ranges);
+        into.scan.repeats.clone_from(&scan.repeats);
         into.states.clear();
         into.states.extend_from_slice(states);
         into.noise.clear();
@@ -161,20 +162,23 @@ impl Corrector {
         for spot in &mut self.spots {
             let reading = scan.ranges[spot.beam];
             // What the table does not cover is dropped at the end; its place is still telling.
-            let found = corrected(&self.table, reading, spot.incidence);
+            let share = scan.variance_share(spot.beam);
+            let found = corrected(&self.table, reading, share, spot.incidence);
             (spot.range, spot.variance) =
-                found.map_or((reading, spot.variance), |(c, _)| (c.range, c.variance));
+                found.map_or((reading, spot.variance), |(c, _)| (c.range, share * c.variance));
         }
         self.find_incidences(self.config.sides_rms);
         let count = self.spots.len() - 2 * overlap;
         for spot in &self.spots[overlap..overlap + count] {
-            let reading = scan.ranges[spot.beam];
+            let (reading, share) = (scan.ranges[spot.beam], scan.variance_share(spot.beam));
             into.incidences[spot.beam] = spot.incidence.angle;
             if spot.run.0 == spot.run.1 {
                 into.states[spot.beam] = BeamState::Isolated;
             } else if spot.incidence.angle > self.table.incidence_max() {
                 into.states[spot.beam] = BeamState::Oblique;
-            } else if let Some((found, noise)) = corrected(&self.table, reading, spot.incidence) {
+            } else if let Some((found, noise)) =
+                corrected(&self.table, reading, share, spot.incidence)
+            {
                 into.scan.ranges[spot.beam] = found.range;
                 into.noise[spot.beam] = noise;
             } else {
@@ -199,7 +203,8 @@ impl Corrector {
         for (beam, _) in states.iter().enumerate().filter(|(_, s)| **s == BeamState::Hit) {
             let range = scan.ranges[beam];
             // Noise as if met squarely; a reading far outside the table is none of its own.
-            let variance = self.table.correct(range, 0.0).map_or(0.0, |c| c.variance);
+            let variance = self.table.correct(range, 0.0).map_or(0.0, |c| c.variance)
+                * scan.variance_share(beam);
             self.spots.push(Spot {
                 beam,
                 direction: self.directions.1[beam],
@@ -329,22 +334,23 @@ impl LocalLine {
     }
 }
 
-/// The range that a reading means, and its noise.
+/// The range that a reading means, and its noise, of which it has this share of a single reading's.
 fn corrected(
     table: &RangeTable,
     reading: f64,
+    share: f64,
     incidence: Incidence,
 ) -> Option<(CorrectedRange, BeamNoise)> {
     if incidence.angle.is_nan() {
         let (found, spread) = table.correct_unknown(reading)?;
         // Nobody knows whether the next beam is off by the same: it counts both ways.
         let shared = spread * spread;
-        return Some((found, BeamNoise { variance: found.variance + shared, shared }));
+        return Some((found, BeamNoise { variance: share * found.variance + shared, shared }));
     }
     let found = table.correct(reading, incidence.angle)?;
     // Neighbours share most of the points that their incidences come from.
     let shared = found.slope * found.slope * incidence.variance;
-    Some((found, BeamNoise { variance: found.variance, shared }))
+    Some((found, BeamNoise { variance: share * found.variance, shared }))
 }
 
 /// `atan2(sqrt(y), sqrt(x))` to within 1e-5 rad, in a third of the time (Hastings 1955, sheet 11).
@@ -411,7 +417,13 @@ mod tests {
         let ranges = (0..beams)
             .map(|b| if seen(b) { truth[b] + bias(truth[b], incidence(b)) } else { f64::INFINITY })
             .collect();
-        let scan = Scan { geometry, ranges, range_max: 9.0, robot_from_sensor: Pose::identity() };
+        let scan = Scan {
+            geometry,
+            ranges,
+            range_max: 9.0,
+            robot_from_sensor: Pose::identity(),
+            repeats: Vec::new(),
+        };
         (scan, truth, (0..beams).map(incidence).collect())
     }
 
@@ -506,7 +518,13 @@ mod tests {
         let truth = |b: usize| 1.5 / incidence(b).to_radians().cos();
         let ranges: Vec<f64> =
             (0..=90).map(|b| truth(b) + walk(truth(b), incidence(b).to_radians())).collect();
-        let scan = Scan { geometry, ranges, range_max: 9.0, robot_from_sensor: Pose::identity() };
+        let scan = Scan {
+            geometry,
+            ranges,
+            range_max: 9.0,
+            robot_from_sensor: Pose::identity(),
+            repeats: Vec::new(),
+        };
         let done = corrector(&scanner(walk)).correct(&scan, &judged(&scan));
         for beam in 0..=90 {
             let off = (done.incidences[beam].to_degrees() - incidence(beam)).abs();
@@ -523,6 +541,7 @@ mod tests {
             ranges: [&ranges[..], &[9.9; 4], &[2.0; 3], &[f64::NAN; 4], &[2.3]].concat(),
             range_max: 99.0,
             robot_from_sensor: Pose::identity(),
+            repeats: Vec::new(),
         };
         let profile = scanner(walk);
         let done = corrector(&profile).correct(&scan, &judged(&scan));

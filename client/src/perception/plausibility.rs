@@ -181,6 +181,7 @@ mod tests {
             ranges,
             range_max: 50.0,
             robot_from_sensor: Pose::identity(),
+            repeats: Vec::new(),
         }
     }
 

@@ -119,7 +119,9 @@ pub fn points_into(
     let beams = states.iter().zip(&scan.ranges).zip(directions).enumerate();
     for (beam, ((state, range), direction)) in beams {
         if *state == BeamState::Hit {
-            points.push(ScanPoint::new(beam, *range, *direction, noise));
+            let mut point = ScanPoint::new(beam, *range, *direction, noise);
+            point.variance_along *= scan.variance_share(beam);
+            points.push(point);
         }
     }
 }

@@ -37,9 +37,25 @@ pub struct Scan {
     pub range_max: f64,
     /// Where the scanner sits.
     pub robot_from_sensor: Pose<Robot, Sensor>,
+    /// Of how many readings each range is the mean; empty if each is one reading.
+    pub repeats: Vec<u16>,
 }
 
 impl Scan {
+    /// Whether a range means that something was hit, as far as the scan tells.
+    pub fn is_return(&self, range: f64) -> bool {
+        range.is_finite() && range > 0.0 && range < self.range_max
+    }
+
+    /// The share of a single reading's variance that the range of a beam has. The mean of what is
+    /// left after some were thrown out has up to 15 % more than that of as many unsorted ones.
+    pub fn variance_share(&self, beam: usize) -> f64 {
+        const SORTED_OUT: f64 = 1.15;
+        self.repeats
+            .get(beam)
+            .map_or(1.0, |count| (SORTED_OUT / f64::from((*count).max(1))).min(1.0))
+    }
+
     /// The unit vector along a beam, in the sensor frame.
     pub fn direction(&self, beam: usize) -> Point {
         unit_normal(self.geometry.bearing(beam))

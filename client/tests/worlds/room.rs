@@ -81,6 +81,12 @@ impl Room {
                 self.cast(Point::new(x, y), bearing) + range_sd * chance.gauss()
             })
             .collect();
-        Scan { geometry, ranges, range_max: 30.0, robot_from_sensor: Pose::identity() }
+        Scan {
+            geometry,
+            ranges,
+            range_max: 30.0,
+            robot_from_sensor: Pose::identity(),
+            repeats: Vec::new(),
+        }
     }
 }

@@ -102,6 +102,7 @@ impl Set {
                 ranges: sweep.ranges.clone(),
                 range_max: REACH_M,
                 robot_from_sensor: Pose::identity(),
+                repeats: Vec::new(),
             })
             .collect()
     }

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use mapfold_client::perception::correction::{Corrected, CorrectionConfig, Corrector};
 use mapfold_client::perception::plausibility::{PlausibilityConfig, judge};
 use mapfold_client::perception::{BeamState, Config, extract_corrected};
+use mapfold_client::robot::at_rest::{self, AtRestConfig};
 use mapfold_client::sensor::calibration::{
     Calibration, CalibrationConfig, TargetReadings, calibrate,
 };
@@ -30,9 +31,16 @@ pub struct Sample {
     pub in_situ: Option<f64>,
     /// Deviation claimed for that: noise, shared and systematic parts.
     pub claimed: f64,
+    /// The same for the mean of [`AT_REST`] sweeps of a robot that stands.
+    pub at_rest: Option<f64>,
+    /// Deviation claimed for that.
+    pub claimed_at_rest: f64,
     /// What noise alone, without any systematic error, would have deviated by.
     pub noise_sd: f64,
 }
+
+/// Sweeps that a robot takes while it stands.
+pub const AT_REST: usize = 5;
 
 /// A straight wall 0.8 to 2.2 m away, turned by up to 30 degrees.
 fn wall(noise: &mut Noise) -> World {
@@ -117,13 +125,8 @@ impl Seeing {
         })
     }
 
-    /// One sweep from the origin: what it met, the judged readings, and these corrected.
-    fn sweep(
-        &mut self,
-        world: &World,
-        heading: f64,
-        noise: &mut Noise,
-    ) -> (Vec<IrBeam>, Vec<BeamState>, Corrected) {
+    /// One sweep from the origin: what it met, and as the robot reads it.
+    fn read(&self, world: &World, heading: f64, noise: &mut Noise) -> (Vec<IrBeam>, Scan) {
         let beams = self.scanner.sweep(world, (Point::new(0.0, 0.0), heading), noise);
         let scan = Scan {
             geometry: ScanGeometry {
@@ -133,15 +136,29 @@ impl Seeing {
             ranges: beams.iter().map(|b| b.reading_m.unwrap_or(f64::INFINITY)).collect(),
             range_max: f64::INFINITY,
             robot_from_sensor: SensorPose::identity(),
+            repeats: Vec::new(),
         };
-        let states = judge(&scan, &self.plausibility);
-        let corrected = self.corrector.correct(&scan, &states);
-        (beams, states, corrected)
+        (beams, scan)
+    }
+
+    /// [`AT_REST`] sweeps, as the robot makes one of them.
+    fn stop(&self, world: &World, heading: f64, noise: &mut Noise) -> Result<Scan, String> {
+        let scans: Vec<Scan> = (0..AT_REST).map(|_| self.read(world, heading, noise).1).collect();
+        let scans: Vec<&Scan> = scans.iter().collect();
+        at_rest::mean(&scans, &AtRestConfig::STANDARD).ok_or("too few scans".to_owned())
+    }
+
+    /// A scan's judged readings, and these corrected.
+    fn correct(&mut self, scan: &Scan) -> (Vec<BeamState>, Corrected) {
+        let states = judge(scan, &self.plausibility);
+        let corrected = self.corrector.correct(scan, &states);
+        (states, corrected)
     }
 }
 
 /// Normalised squared errors of the lines that are extracted from corrected sweeps of one wall, 2
-/// on average if their covariances are right; and how many sweeps showed no line or several.
+/// on average if their covariances are right; and how many sweeps showed no line or several. `at_rest`:
+/// of robots that stand, instead of single sweeps.
 ///
 /// # Errors
 /// The profile has no table.
@@ -149,6 +166,7 @@ pub fn line_errors(
     head: &IrHead,
     done: &Calibration,
     sweeps: u32,
+    at_rest: bool,
     noise: &mut Noise,
 ) -> Result<(Vec<f64>, u32), String> {
     let mut seeing = Seeing::new(head, done, Scene::Sector)?;
@@ -156,7 +174,11 @@ pub fn line_errors(
     let (mut errors, mut others) = (Vec::new(), 0);
     for _ in 0..sweeps {
         let world = wall(noise);
-        let (_, _, corrected) = seeing.sweep(&world, 0.0, noise);
+        let scan = match at_rest {
+            true => seeing.stop(&world, 0.0, noise)?,
+            false => seeing.read(&world, 0.0, noise).1,
+        };
+        let (_, corrected) = seeing.correct(&scan);
         let features = extract_corrected(&corrected, &config);
         let [segment] = features.segments.as_slice() else {
             others += 1;
@@ -198,7 +220,10 @@ pub fn samples(
             Scene::Corner => corner(noise),
         };
         let heading = 0.3 * (noise.share() - 0.5);
-        let (beams, states, corrected) = seeing.sweep(&world, heading, noise);
+        let (beams, scan) = seeing.read(&world, heading, noise);
+        let (states, corrected) = seeing.correct(&scan);
+        let settled = seeing.stop(&world, heading, noise)?;
+        let (_, settled) = seeing.correct(&settled);
         for (beam, read) in beams.iter().enumerate() {
             let IrBeam { reading_m: Some(reading), truth: Some((distance, incidence)) } = *read
             else {
@@ -210,16 +235,21 @@ pub fn samples(
             if !counted {
                 continue;
             }
-            let used = corrected.states[beam] == BeamState::Hit;
-            let part = &corrected.noise[beam];
             let systematic = done.profile.systematic_sd_m.powi(2);
+            let [one, mean] = [&corrected, &settled].map(|of| {
+                let (hit, part) = (of.states[beam] == BeamState::Hit, &of.noise[beam]);
+                let error = hit.then(|| of.scan.ranges[beam] - distance);
+                (error, (part.variance + part.shared + systematic).sqrt())
+            });
             samples.push(Sample {
                 distance,
                 incidence_deg: incidence.to_degrees(),
                 raw: reading - distance,
                 known: table.correct(reading, incidence).map(|c| c.range - distance),
-                in_situ: used.then(|| corrected.scan.ranges[beam] - distance),
-                claimed: (part.variance + part.shared + systematic).sqrt(),
+                in_situ: one.0,
+                claimed: one.1,
+                at_rest: mean.0,
+                claimed_at_rest: mean.1,
                 noise_sd: head.deviation(distance, incidence),
             });
         }

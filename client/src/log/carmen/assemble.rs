@@ -97,7 +97,8 @@ impl State {
                 let range_max = self.front_max;
                 self.scanner.get_or_insert(make_by_range(range_max));
                 let robot_from_sensor = Pose::identity();
-                let scan = Scan { geometry, ranges, range_max, robot_from_sensor };
+                let scan =
+                    Scan { geometry, ranges, range_max, robot_from_sensor, repeats: Vec::new() };
                 self.scan(scan, pose(robot), Some(pose(odom)), time_s);
             }
             Message::RobotLaser {
@@ -122,6 +123,7 @@ impl State {
                     ranges,
                     range_max,
                     robot_from_sensor: level_from_robot.inverse().compose(&level_from_sensor),
+                    repeats: Vec::new(),
                 };
                 self.scan(scan, level_from_robot, self.odom, time_s);
             }

@@ -1,0 +1,286 @@
+//! What a robot reads while it stands is one look, and a better one.
+//!
+//! Fifty scans from one stop share the error of its pose: counted as fifty looks, a wall would seem
+//! to be known fifty times. Their ranges, on the other hand, have noise of their own each. So all
+//! scans of a stop become one, whose ranges are means of what agrees beam by beam: median and median
+//! absolute deviation throw out what passed by, and single readings that went wrong.
+//!
+//! Rings of sonars are left as they are: what makes them err does not change from one to the next.
+
+use mapfold_map::geometry::Pose;
+
+use crate::log::{Observation, Reading};
+use crate::sensor::Scan;
+
+/// When a robot stands, and which readings of a stop agree.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AtRestConfig {
+    /// A robot whose pose has moved no farther than this since the stop began stands, metres.
+    pub moved_max: f64,
+    /// The same for its heading, radians.
+    pub turned_max: f64,
+    /// Scans farther apart than this are of two stops, seconds.
+    pub pause_max: f64,
+    /// Fewer scans are left as they are: a median of two tells nothing.
+    pub scans_min: usize,
+    /// A longer stop is several looks.
+    pub scans_max: usize,
+    /// Readings that deviate from the median by more than this many deviations (1.4826 times the
+    /// median absolute deviation) are left out.
+    pub deviations_max: f64,
+    /// Least such deviation, metres: heads that tell whole centimetres seem to have none.
+    pub deviation_min: f64,
+}
+
+impl AtRestConfig {
+    /// The defaults.
+    pub const STANDARD: Self = Self {
+        moved_max: 0.002,
+        turned_max: 0.1 * std::f64::consts::PI / 180.0,
+        pause_max: 2.0,
+        scans_min: 3,
+        scans_max: 64,
+        deviations_max: 3.5,
+        deviation_min: 0.005,
+    };
+}
+
+/// Median absolute deviations of a normal distribution in its standard deviation (Hampel 1974).
+const DEVIATIONS_IN_SD: f64 = 1.4826;
+
+/// Makes one scan of all that were taken in each stop; other readings stay. Readings are numbered
+/// anew.
+pub fn settle(readings: Vec<Reading>, config: &AtRestConfig) -> Vec<Reading> {
+    let mut settled: Vec<Reading> = Vec::with_capacity(readings.len());
+    let mut stop: Vec<Reading> = Vec::new();
+    for reading in readings {
+        if stop.first().zip(stop.last()).is_some_and(|(first, last)| {
+            stop.len() >= config.scans_max || !stands(first, last, &reading, config)
+        }) {
+            end(&mut stop, &mut settled, config);
+        }
+        match reading.observation {
+            Observation::Scan(_) => stop.push(reading),
+            Observation::Ring(_) => settled.push(reading),
+        }
+    }
+    end(&mut stop, &mut settled, config);
+    // Rings of a stop were laid down before its scans.
+    settled.sort_by_key(|reading| reading.index);
+    for (index, reading) in (0..).zip(&mut settled) {
+        reading.index = index;
+    }
+    settled
+}
+
+/// Whether `next` may belong to the stop between `first` and `last`. A ring in between does not end
+/// a stop while the robot stands.
+fn stands(first: &Reading, last: &Reading, next: &Reading, config: &AtRestConfig) -> bool {
+    fn near<A: Copy, B: Copy>(a: &Pose<A, B>, b: &Pose<A, B>, config: &AtRestConfig) -> bool {
+        let moved = a.inverse().compose(b);
+        moved.position().norm() <= config.moved_max && moved.heading().abs() <= config.turned_max
+    }
+    let by_log = match (&first.level_from_robot, &next.level_from_robot) {
+        (Some(a), Some(b)) => Some(near(a, b, config)),
+        _ => None,
+    };
+    let by_wheels = match (&first.odom_from_robot, &next.odom_from_robot) {
+        (Some(a), Some(b)) => Some(near(a, b, config)),
+        _ => None,
+    };
+    let alike = match (&last.observation, &next.observation) {
+        (Observation::Scan(a), Observation::Scan(b)) => {
+            a.geometry == b.geometry
+                && a.ranges.len() == b.ranges.len()
+                && a.range_max.to_bits() == b.range_max.to_bits()
+                && a.robot_from_sensor == b.robot_from_sensor
+        }
+        _ => true,
+    };
+    let waited = next.time_s - last.time_s;
+    alike
+        && (0.0..=config.pause_max).contains(&waited)
+        && by_log.or(by_wheels).is_some()
+        && by_log.unwrap_or(true)
+        && by_wheels.unwrap_or(true)
+}
+
+/// Lays the scans of a stop down, as one if they are enough.
+fn end(stop: &mut Vec<Reading>, settled: &mut Vec<Reading>, config: &AtRestConfig) {
+    let scans: Vec<&Scan> = stop
+        .iter()
+        .filter_map(|reading| match &reading.observation {
+            Observation::Scan(scan) => Some(scan),
+            Observation::Ring(_) => None,
+        })
+        .collect();
+    match mean(&scans, config) {
+        Some(scan) => settled.extend(
+            stop.drain(..)
+                .next_back()
+                .map(|last| Reading { observation: Observation::Scan(scan), ..last }),
+        ),
+        None => settled.append(stop),
+    }
+}
+
+/// The scan that scans of one stop come to, beam by beam; `None` if they are too few. A beam has a
+/// return if at least half of them have one.
+pub fn mean(scans: &[&Scan], config: &AtRestConfig) -> Option<Scan> {
+    let (first, _) = scans.split_first().filter(|_| scans.len() >= config.scans_min)?;
+    let mut settled = Scan { repeats: Vec::with_capacity(first.ranges.len()), ..(*first).clone() };
+    let (mut returns, mut deviations) = (Vec::new(), Vec::new());
+    for beam in 0..first.ranges.len() {
+        let read = || scans.iter().filter_map(|scan| Some((scan, *scan.ranges.get(beam)?)));
+        returns.clear();
+        returns.extend(read().filter(|(scan, r)| scan.is_return(*r)).map(|(_, r)| r));
+        if 2 * returns.len() < scans.len() {
+            let none = read().find(|(scan, r)| !scan.is_return(*r)).map(|(_, r)| r);
+            settled.ranges[beam] = none.unwrap_or(f64::NAN);
+            settled.repeats.push(1);
+            continue;
+        }
+        let median = median(&mut returns);
+        deviations.clear();
+        deviations.extend(returns.iter().map(|r| (r - median).abs()));
+        let deviation =
+            (DEVIATIONS_IN_SD * self::median(&mut deviations)).max(config.deviation_min);
+        let agree =
+            returns.iter().filter(|r| (**r - median).abs() <= config.deviations_max * deviation);
+        let (count, sum) = agree.fold((0_u16, 0.0), |(n, sum), r| (n.saturating_add(1), sum + r));
+        settled.ranges[beam] = sum / f64::from(count.max(1));
+        settled.repeats.push(count.max(1));
+    }
+    Some(settled)
+}
+
+/// The middle one, or the mean of the two in the middle; not to be asked of nothing.
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    match values.len() {
+        0 => f64::NAN,
+        n if n % 2 == 1 => values[middle],
+        _ => 0.5 * (values[middle - 1] + values[middle]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(
+        clippy::float_cmp,
+        reason = "tests may stop at the first surprise, and numbers that pass through stay as they are"
+    )]
+
+    use rand::rngs::StdRng;
+    use rand::{RngExt as _, SeedableRng};
+
+    use super::*;
+    use crate::sensor::{Ring, ScanGeometry};
+
+    const CONFIG: AtRestConfig = AtRestConfig::STANDARD;
+
+    fn scan(ranges: &[f64]) -> Scan {
+        Scan {
+            geometry: ScanGeometry { first_bearing: -1.0, increment: 0.01 },
+            ranges: ranges.to_vec(),
+            range_max: 8.0,
+            robot_from_sensor: Pose::identity(),
+            repeats: Vec::new(),
+        }
+    }
+
+    fn reading(index: u32, time_s: f64, x: f64, range: f64) -> Reading {
+        Reading {
+            index,
+            time_s,
+            level_from_robot: None,
+            odom_from_robot: Some(Pose::new(x, 0.0, 0.3)),
+            observation: Observation::Scan(scan(&[range])),
+        }
+    }
+
+    fn mean_of(scans: &[Scan]) -> Scan {
+        mean(&scans.iter().collect::<Vec<_>>(), &CONFIG).unwrap()
+    }
+
+    #[test]
+    fn the_scans_of_a_stop_are_one_look_and_those_on_the_way_stay() {
+        let stop = |from: u32| (from..from + 4).map(|i| reading(i, f64::from(i), 2.0, 3.0));
+        let way = |i: u32| reading(i, f64::from(i), f64::from(i), 1.0);
+        let all: Vec<Reading> = (0..2).map(way).chain(stop(2)).chain((6..8).map(way)).collect();
+        let settled = settle(all.clone(), &CONFIG);
+        let numbers: Vec<u32> = settled.iter().map(|r| r.index).collect();
+        assert_eq!(numbers, [0, 1, 2, 3, 4]);
+        assert_eq!(settled[..2], all[..2]);
+        assert_eq!(settled[2].time_s, 5.0, "told when the last of them was taken");
+        let Observation::Scan(scan) = &settled[2].observation else { panic!("no scan") };
+        assert_eq!((scan.ranges[0], scan.repeats[0]), (3.0, 4));
+        assert_eq!(settled[3].observation, all[6].observation);
+    }
+
+    #[test]
+    fn a_pause_a_move_a_pair_or_too_many_are_no_one_look() {
+        let count = |readings: Vec<Reading>| settle(readings, &CONFIG).len();
+        let at = |i: u32, x: f64| reading(i, f64::from(i), x, 3.0);
+        assert_eq!(count((0..3).map(|i| at(i, 0.0)).collect()), 1);
+        assert_eq!(count((0..2).map(|i| at(i, 0.0)).collect()), 2, "a pair");
+        assert_eq!(count((0..3).map(|i| reading(i, 3.0 * f64::from(i), 0.0, 3.0)).collect()), 3);
+        // Creeping: each step is small, their sum is not.
+        assert_eq!(count((0..9).map(|i| at(i, 0.0015 * f64::from(i))).collect()), 9);
+        assert_eq!(count((0..130).map(|i| at(i, 0.0)).collect()), 2 + 2);
+        let lost = |i| Reading { odom_from_robot: None, ..at(i, 0.0) };
+        assert_eq!(count((0..5).map(lost).collect()), 5, "nobody knows that it stands");
+    }
+
+    #[test]
+    fn rings_keep_their_place() {
+        let ring = |i: u32| Reading {
+            observation: Observation::Ring(Ring { cone: 0.4, sonars: Vec::new() }),
+            ..reading(i, f64::from(i), 0.0, 1.0)
+        };
+        let scan = |i: u32| reading(i, f64::from(i), 0.0, 1.0);
+        let kinds = |settled: Vec<Reading>| -> String {
+            let kind = |r: &Reading| matches!(r.observation, Observation::Ring(_));
+            settled.iter().map(|r| if kind(r) { 'o' } else { 's' }).collect()
+        };
+        assert_eq!(kinds(settle(vec![scan(0), ring(1), scan(2)], &CONFIG)), "sos");
+        assert_eq!(
+            kinds(settle(vec![scan(0), ring(1), scan(2), scan(3), ring(4)], &CONFIG)),
+            "oso"
+        );
+    }
+
+    #[test]
+    fn what_passes_by_is_left_out_and_half_the_returns_make_one() {
+        let scans: Vec<Scan> = [3.00, 3.01, 1.2, 2.99, 3.00].iter().map(|r| scan(&[*r])).collect();
+        let settled = mean_of(&scans);
+        assert!((settled.ranges[0] - 3.0).abs() < 1e-12 && settled.repeats[0] == 4);
+        let of = |ranges: [f64; 4]| mean_of(&ranges.map(|r| scan(&[r]))).ranges[0];
+        assert_eq!(of([2.0, 2.0, 8.0, 9.0]), 2.0);
+        assert!(!scan(&[]).is_return(of([2.0, f64::INFINITY, 8.0, 0.0])));
+    }
+
+    #[test]
+    fn the_mean_has_the_variance_that_it_claims() {
+        let mut chance = StdRng::seed_from_u64(5);
+        let mut normal = move || {
+            let sum: f64 = (0..12).map(|_| chance.random::<f64>()).sum();
+            sum - 6.0
+        };
+        let beams = 500;
+        for stop in [3, 4, 6, 20] {
+            let (mut square, mut claimed) = (0.0, 0.0);
+            for _ in 0..20 {
+                let scans: Vec<Scan> = (0..stop)
+                    .map(|_| scan(&(0..beams).map(|_| 4.0 + 0.02 * normal()).collect::<Vec<_>>()))
+                    .collect();
+                let settled = mean_of(&scans);
+                square += settled.ranges.iter().map(|r| (r - 4.0).powi(2)).sum::<f64>();
+                claimed += (0..beams).map(|b| 4e-4 * settled.variance_share(b)).sum::<f64>();
+            }
+            let ratio = square / claimed;
+            assert!((0.85..1.05).contains(&ratio), "{stop} scans: {ratio}");
+        }
+    }
+}
