@@ -33,8 +33,12 @@ pub(super) struct FusedLine {
 struct Estimate {
     look: ContributionId,
     z: Vector2<f64>,
-    r: Matrix2<f64>,
-    p: Matrix2<f64>,
+    /// What only this line of this look errs by.
+    own: Matrix2<f64>,
+    /// What all lines of this look err by, and no other look.
+    fix: Matrix2<f64>,
+    /// What other looks may err by as well.
+    shared: Matrix2<f64>,
 }
 
 /// The inverse of a symmetric 2x2 matrix; `None` unless it is positive definite.
@@ -55,43 +59,45 @@ pub(super) fn fuse<'a>(
     // Once somebody has localized on the map, the error of a fix on surveyed landmarks that is in it
     // may be in other poses too.
     let fixes_are_own = sightings.clone().all(|(_, s)| s.is_datum);
+    let fed_back =
+        if fixes_are_own { 0.0 } else { fed_back(count_looks(sightings.clone()), config.fed_back) };
     let looks = one_per_look(sightings.map(|(id, s)| {
         let (offset, lever) = s.offset_about(&anchor);
-        let (r, p) = if fixes_are_own {
-            (s.independent + s.own_fix, s.dependent)
+        let (own, fix, shared) = if fixes_are_own {
+            (s.independent, s.own_fix, s.dependent)
         } else {
-            (
-                s.independent * (1.0 - config.fed_back),
-                s.dependent + s.own_fix + s.independent * config.fed_back,
-            )
+            let shared = s.dependent + s.own_fix + s.independent * fed_back;
+            (s.independent * (1.0 - fed_back), Matrix2::zeros(), shared)
         };
         Estimate {
             look: id.contribution,
             z: Vector2::new(offset, difference(s.alpha, reference.alpha)),
-            r: about(&r, lever),
-            p: about(&p, lever),
+            own: about(&own, lever),
+            fix: about(&fix, lever),
+            shared: about(&shared, lever),
         }
     }));
     let weights: Vec<f64> =
-        looks.iter().map(|e| 1.0 / scaled_trace(&(e.r + e.p), config)).collect();
+        looks.iter().map(|e| 1.0 / scaled_trace(&(e.own + e.fix + e.shared), config)).collect();
     let total: f64 = weights.iter().sum();
     let mut information = Matrix2::zeros();
     let mut weighted = Vector2::zeros();
     let mut parts = Vec::with_capacity(looks.len());
     for (estimate, weight) in looks.iter().zip(&weights) {
-        let shared = estimate.p * (total / weight);
-        let Some(b_inverse) = inverse(&(estimate.r + shared)) else { continue };
+        let shared = estimate.shared * (total / weight);
+        let Some(b_inverse) = inverse(&(estimate.own + estimate.fix + shared)) else { continue };
         information += b_inverse;
         weighted += b_inverse * estimate.z;
-        parts.push((b_inverse, estimate.r, shared));
+        // Looks do not share their fixes, but a look's lines do.
+        parts.push((b_inverse, estimate.own, estimate.fix + shared));
     }
     let c = inverse(&information)?;
     let fused = c * weighted;
     let (mut independent, mut dependent) = (Matrix2::zeros(), Matrix2::zeros());
-    for (b_inverse, r, shared) in parts {
+    for (b_inverse, own, common) in parts {
         let k = c * b_inverse;
-        independent += k * r * k.transpose();
-        dependent += k * shared * k.transpose();
+        independent += k * own * k.transpose();
+        dependent += k * common * k.transpose();
     }
     let symmetric = |m: Matrix2<f64>| (m + m.transpose()) * 0.5;
     Some(FusedLine {
@@ -103,6 +109,31 @@ pub(super) fn fuse<'a>(
     })
 }
 
+/// Of so many looks, those that are distinct.
+fn count_looks<'a>(sightings: impl Iterator<Item = (FeatureId, &'a Sighting)>) -> u32 {
+    let mut last = None;
+    let new =
+        |(id, _): &(FeatureId, &Sighting)| last.replace(id.contribution) != Some(id.contribution);
+    sightings.filter(new).count() as u32
+}
+
+/// The share of each look's sensor covariance that counts as shared among `looks` looks, so that
+/// their fusion claims what is left of it when every pose takes over `weight` of the error that the
+/// wall has by then: the mean of n looks then errs by
+/// `x_n = x_(n-1) (1 - (1 - weight) / n) + e_n / n`.
+fn fed_back(looks: u32, weight: f64) -> f64 {
+    if looks < 2 {
+        return 1.0;
+    }
+    let mut variance = 1.0;
+    for n in (2..=looks).map(f64::from) {
+        variance = variance * (1.0 - (1.0 - weight) / n).powi(2) + 1.0 / (n * n);
+    }
+    // Averaging what is not shared leaves 1 / n of it.
+    let averaged = 1.0 / f64::from(looks);
+    ((variance - averaged) / (1.0 - averaged)).clamp(0.0, 1.0)
+}
+
 /// Pieces of one look share one pose error: they count as one estimate, averaged by their own
 /// errors, with the shared part of the most precise of them.
 fn one_per_look(estimates: impl Iterator<Item = Estimate>) -> Vec<Estimate> {
@@ -110,14 +141,57 @@ fn one_per_look(estimates: impl Iterator<Item = Estimate>) -> Vec<Estimate> {
     for next in estimates {
         match looks.last_mut() {
             Some(last) if last.look == next.look => {
-                let (Some(a), Some(b)) = (inverse(&last.r), inverse(&next.r)) else { continue };
-                let Some(r) = inverse(&(a + b)) else { continue };
-                let z = r * (a * last.z + b * next.z);
-                let p = if b.trace() > a.trace() { next.p } else { last.p };
-                *last = Estimate { look: next.look, z, r, p };
+                let (Some(a), Some(b)) = (inverse(&last.own), inverse(&next.own)) else { continue };
+                let Some(own) = inverse(&(a + b)) else { continue };
+                let z = own * (a * last.z + b * next.z);
+                let best = if b.trace() > a.trace() { next } else { *last };
+                *last = Estimate { z, own, ..best };
             }
             _ => looks.push(next),
         }
     }
     looks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_comes_back_is_all_or_nothing_at_the_ends() {
+        for looks in [2, 3, 10, 100] {
+            assert!(fed_back(looks, 0.0).abs() < 1e-12, "poses that owe nothing to the map");
+            assert!(fed_back(looks, 1.0) >= 1.0, "poses that repeat what the wall is said to be");
+            let more = [0.2, 0.4, 0.6].map(|weight| fed_back(looks, weight));
+            assert!(more[0] < more[1] && more[1] < more[2], "{more:?}");
+        }
+        assert!((fed_back(2, 0.5) - 0.625).abs() < 1e-12);
+        assert!((1..100).all(|n| fed_back(n + 1, 0.5) < fed_back(n, 0.5)));
+    }
+
+    /// A number as random as it must be for a mean square.
+    fn uniform(state: &mut u64) -> f64 {
+        *state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((*state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) * 12f64.sqrt()
+    }
+
+    #[test]
+    fn the_mean_of_looks_that_repeat_half_of_what_they_find_errs_as_claimed() {
+        let (mut state, runs) = (9, 20_000);
+        for looks in [2, 5, 20] {
+            let mut square = 0.0;
+            for _ in 0..runs {
+                let mut mean = uniform(&mut state);
+                for n in (2..=looks).map(f64::from) {
+                    let seen = 0.5 * mean + uniform(&mut state);
+                    mean += (seen - mean) / n;
+                }
+                square += mean * mean / f64::from(runs);
+            }
+            let shared = fed_back(looks, 0.5);
+            let claimed = shared + (1.0 - shared) / f64::from(looks);
+            assert!((square / claimed - 1.0).abs() < 0.04, "{looks}: {square} for {claimed}");
+        }
+    }
 }

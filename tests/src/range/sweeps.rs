@@ -174,9 +174,10 @@ pub fn line_errors(
     let (mut errors, mut others) = (Vec::new(), 0);
     for _ in 0..sweeps {
         let world = wall(noise);
-        let scan = match at_rest {
-            true => seeing.stop(&world, 0.0, noise)?,
-            false => seeing.read(&world, 0.0, noise).1,
+        let scan = if at_rest {
+            seeing.stop(&world, 0.0, noise)?
+        } else {
+            seeing.read(&world, 0.0, noise).1
         };
         let (_, corrected) = seeing.correct(&scan);
         let features = extract_corrected(&corrected, &config);
