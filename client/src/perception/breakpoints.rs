@@ -162,8 +162,17 @@ impl Reach {
         let distance_sq = (b.at - a.at).norm_squared();
         let near = (self.surface * a.range).min(config.gap_cap);
         // Most neighbours are so close that nothing else need be asked.
-        if b.beam == a.beam + 1 && distance_sq <= near * near {
-            return Gap::Near;
+        if b.beam == a.beam + 1 {
+            if distance_sq <= near * near {
+                return Gap::Near;
+            }
+            // A square of a sum is no less than the sum of the squares, which needs no root.
+            let noise_sq = config.gap_sds * config.gap_sds * (a.variance_along + b.variance_along);
+            if distance_sq <= near * near + noise_sq
+                && distance_sq <= config.gap_cap * config.gap_cap
+            {
+                return Gap::Near;
+            }
         }
         self.wider_gap(a, b, distance_sq, ring, config)
     }

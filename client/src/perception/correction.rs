@@ -203,8 +203,8 @@ impl Corrector {
         for (beam, _) in states.iter().enumerate().filter(|(_, s)| **s == BeamState::Hit) {
             let range = scan.ranges[beam];
             // Noise as if met squarely; a reading far outside the table is none of its own.
-            let variance = self.table.correct(range, 0.0).map_or(0.0, |c| c.variance)
-                * scan.variance_share(beam);
+            let variance =
+                self.table.variance_met_squarely(range).unwrap_or(0.0) * scan.variance_share(beam);
             self.spots.push(Spot {
                 beam,
                 direction: self.directions.1[beam],

@@ -119,9 +119,12 @@ pub fn points_into(
     let beams = states.iter().zip(&scan.ranges).zip(directions).enumerate();
     for (beam, ((state, range), direction)) in beams {
         if *state == BeamState::Hit {
-            let mut point = ScanPoint::new(beam, *range, *direction, noise);
-            point.variance_along *= scan.variance_share(beam);
-            points.push(point);
+            points.push(ScanPoint::new(beam, *range, *direction, noise));
+        }
+    }
+    if !scan.repeats.is_empty() {
+        for point in points {
+            point.variance_along *= scan.variance_share(point.beam);
         }
     }
 }

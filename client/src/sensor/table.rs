@@ -68,7 +68,9 @@ impl RangeTable {
     /// the surface's normal; `None` outside the table. Beyond the last incidence, the last curve.
     pub fn correct(&self, reading: f64, incidence: f64) -> Option<CorrectedRange> {
         let last = self.incidences.len() - 1;
-        let next = self.incidences.iter().position(|i| *i > incidence).unwrap_or(last);
+        // Counted to the end: where to stop is what no branch predictor knows. NaN is beyond all.
+        let beyond: usize = self.incidences.iter().map(|i| usize::from(*i > incidence)).sum();
+        let next = (self.incidences.len() - beyond).min(last);
         let Some(below) = next.checked_sub(1).filter(|_| incidence < self.incidences[last]) else {
             let (range, variance) = self.curves[next].at(reading)?;
             return Some(CorrectedRange { range, variance, slope: 0.0 });
@@ -81,6 +83,17 @@ impl RangeTable {
             variance: low.1 + share * (high.1 - low.1),
             slope: (high.0 - low.0) / step,
         })
+    }
+
+    /// The variance of what a reading means if its beam met a surface squarely; `None` outside the
+    /// table. What [`Self::correct`] says for no incidence, at half the cost.
+    pub(crate) fn variance_met_squarely(&self, reading: f64) -> Option<f64> {
+        match &self.curves[..] {
+            [square, next, ..] if self.incidences[0].total_cmp(&0.0).is_eq() => {
+                square.at(reading).filter(|_| next.covers(reading)).map(|(_, variance)| variance)
+            }
+            _ => self.correct(reading, 0.0).map(|found| found.variance),
+        }
     }
 
     /// The distance if nothing is known of the incidence: that of the curve of least incidence,
@@ -185,14 +198,20 @@ impl Curve {
         }
     }
 
-    /// Range and variance at a reading, if it is one of the table.
-    fn at(&self, reading: f64) -> Option<(f64, f64)> {
+    /// Whether a reading is one of the table; NaN is not.
+    #[inline]
+    fn covers(&self, reading: f64) -> bool {
         let (first, last) = (&self.knots[0], &self.knots[self.knots.len() - 1]);
-        // Written so that NaN has no answer.
-        if !(reading >= first.reading - EXTRAPOLATED_M && reading <= last.reading + EXTRAPOLATED_M)
-        {
+        reading >= first.reading - EXTRAPOLATED_M && reading <= last.reading + EXTRAPOLATED_M
+    }
+
+    /// Range and variance at a reading, if it is one of the table.
+    #[inline]
+    fn at(&self, reading: f64) -> Option<(f64, f64)> {
+        if !self.covers(reading) {
             return None;
         }
+        let (first, last) = (&self.knots[0], &self.knots[self.knots.len() - 1]);
         if reading <= first.reading {
             return Some((first.range + (reading - first.reading), first.variance));
         }
@@ -201,7 +220,10 @@ impl Curve {
         }
         let cell = ((reading - first.reading) * self.cells_per_metre) as usize;
         let mut at = self.cells[cell.min(self.cells.len() - 1)] as usize;
-        while at + 2 < self.knots.len() && self.knots[at + 1].reading <= reading {
+        // One step at most, nearly always; whether it is taken is chance, so it is no branch.
+        let knots_before_last = self.knots.len() - 2;
+        at += usize::from(at < knots_before_last && self.knots[at + 1].reading <= reading);
+        while at < knots_before_last && self.knots[at + 1].reading <= reading {
             at += 1;
         }
         let low = &self.knots[at];
@@ -293,6 +315,19 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn what_is_met_squarely_has_the_variance_of_no_incidence(
+            amplitude in 0.0..0.05,
+            reading in 0.0..4.5,
+            first_incidence in prop::sample::select(vec![0.0, 0.05]),
+        ) {
+            let mut correction = table_of(head(amplitude, 0.7, 0.05), 0.02);
+            correction.incidences_rad[0] = first_incidence;
+            let table = RangeTable::new(&correction);
+            let whole = table.correct(reading, 0.0).map(|found| found.variance.to_bits());
+            prop_assert_eq!(table.variance_met_squarely(reading).map(f64::to_bits), whole);
+        }
+
         #[test]
         fn a_table_without_bias_changes_nothing(reading in 0.21..4.09, incidence in 0.0..1.5) {
             let table = RangeTable::new(&table_of(|_, _| 0.0, 0.02));
