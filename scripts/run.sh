@@ -36,12 +36,13 @@ MAPFOLD_ADMIN_TOKEN=$token "$programs/mapfold-server" serve \
 server_job=$!
 jobs_started+=("$server_job")
 
-ready() { (exec 3<>"/dev/tcp/${listen%:*}/${listen##*:}") 2>/dev/null; }
-for _ in $(seq 100); do
+# The server itself tells when it is ready: somebody else may hold the port.
+for _ in $(seq 300); do
+    grep -q ' listening' "$data_dir/server.log" 2>/dev/null && break
     kill -0 "$server_job" 2>/dev/null || { cat "$data_dir/server.log" >&2; exit 1; }
-    ready && break
     sleep 0.1
 done
+kill -0 "$server_job" 2>/dev/null || { cat "$data_dir/server.log" >&2; exit 1; }
 
 cat <<EOF
 

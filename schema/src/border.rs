@@ -26,8 +26,13 @@ pub struct Limits {
     pub coordinate_max_m: f64,
     /// Segments in one contribution.
     pub segments_max: usize,
+    /// Length of all segments of one contribution together, metres: what folding them costs grows
+    /// with it, and no scanner sees more of one floor at once.
+    pub segments_length_max_m: f64,
     /// Clusters in one contribution.
     pub clusters_max: usize,
+    /// Width of all clusters of one contribution together, metres.
+    pub clusters_width_max_m: f64,
     /// Points of one hull.
     pub hull_points_max: usize,
     /// Tiles in one contribution.
@@ -42,7 +47,9 @@ pub struct Limits {
 pub const DEFAULT_LIMITS: Limits = Limits {
     coordinate_max_m: 100_000.0,
     segments_max: 4096,
+    segments_length_max_m: 4000.0,
     clusters_max: 4096,
+    clusters_width_max_m: 2000.0,
     hull_points_max: 256,
     tiles_max: 4096,
     evidence_max: 400,

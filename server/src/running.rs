@@ -41,6 +41,9 @@ pub enum StartError {
     /// A chosen admin token that anybody could guess.
     #[error("MAPFOLD_ADMIN_TOKEN must be 16 to 256 visible ASCII characters")]
     WeakAdminToken,
+    /// Nothing was ever kept there.
+    #[error("there is no database {0}: is --data-dir (or --database) right?")]
+    NoDatabase(String),
     /// The database.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -74,6 +77,19 @@ pub async fn open_store(config: &Config) -> Result<Store, StartError> {
     let store = Store::connect(&url).await?;
     store.migrate().await?;
     Ok(store)
+}
+
+/// Opens the store of a server that has run: what looks at a store must not make one.
+///
+/// # Errors
+/// There is none, or it cannot be opened.
+pub(crate) async fn open_existing_store(config: &Config) -> Result<Store, StartError> {
+    if let Some(file) = config.embedded_file()
+        && !file.exists()
+    {
+        return Err(StartError::NoDatabase(file.display().to_string()));
+    }
+    open_store(config).await
 }
 
 /// Starts a server. Port 0 takes a free one; [`Running::address`] tells which.

@@ -100,7 +100,7 @@ fn faults_of(name: &str, outcomes: &[Outcome]) -> Vec<String> {
     faults
 }
 
-const HEADER: [&str; 12] = [
+const HEADER: [&str; 13] = [
     "log",
     "engine",
     "scans",

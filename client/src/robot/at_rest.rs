@@ -30,6 +30,8 @@ pub struct AtRestConfig {
     pub deviations_max: f64,
     /// Least such deviation, metres: heads that tell whole centimetres seem to have none.
     pub deviation_min: f64,
+    /// Greatest such deviation, metres: a beam that meets now one thing and now another has no mean.
+    pub deviation_max: f64,
 }
 
 impl AtRestConfig {
@@ -42,6 +44,7 @@ impl AtRestConfig {
         scans_max: 64,
         deviations_max: 3.5,
         deviation_min: 0.005,
+        deviation_max: 0.1,
     };
 }
 
@@ -125,7 +128,7 @@ fn end(stop: &mut Vec<Reading>, settled: &mut Vec<Reading>, config: &AtRestConfi
 }
 
 /// The scan that scans of one stop come to, beam by beam; `None` if they are too few. A beam has a
-/// return if at least half of them have one.
+/// return if at least half of them agree on one.
 pub fn mean(scans: &[&Scan], config: &AtRestConfig) -> Option<Scan> {
     let (first, _) = scans.split_first().filter(|_| scans.len() >= config.scans_min)?;
     let mut settled = Scan { repeats: Vec::with_capacity(first.ranges.len()), ..(*first).clone() };
@@ -134,35 +137,42 @@ pub fn mean(scans: &[&Scan], config: &AtRestConfig) -> Option<Scan> {
         let read = || scans.iter().filter_map(|scan| Some((scan, *scan.ranges.get(beam)?)));
         returns.clear();
         returns.extend(read().filter(|(scan, r)| scan.is_return(*r)).map(|(_, r)| r));
-        if 2 * returns.len() < scans.len() {
+        let agreed = agreed(&mut returns, &mut deviations, config)
+            .filter(|(count, _)| 2 * usize::from(*count) >= scans.len());
+        let (count, range) = agreed.unwrap_or_else(|| {
             let none = read().find(|(scan, r)| !scan.is_return(*r)).map(|(_, r)| r);
-            settled.ranges[beam] = none.unwrap_or(f64::NAN);
-            settled.repeats.push(1);
-            continue;
-        }
-        let median = median(&mut returns);
-        deviations.clear();
-        deviations.extend(returns.iter().map(|r| (r - median).abs()));
-        let deviation =
-            (DEVIATIONS_IN_SD * self::median(&mut deviations)).max(config.deviation_min);
-        let agree =
-            returns.iter().filter(|r| (**r - median).abs() <= config.deviations_max * deviation);
-        let (count, sum) = agree.fold((0_u16, 0.0), |(n, sum), r| (n.saturating_add(1), sum + r));
-        settled.ranges[beam] = sum / f64::from(count.max(1));
-        settled.repeats.push(count.max(1));
+            (1, none.unwrap_or(f64::NAN))
+        });
+        settled.ranges[beam] = range;
+        settled.repeats.push(count);
     }
     Some(settled)
 }
 
-/// The middle one, or the mean of the two in the middle; not to be asked of nothing.
-fn median(values: &mut [f64]) -> f64 {
+/// How many of the returns lie about their median, and the mean of those.
+fn agreed(
+    returns: &mut [f64],
+    deviations: &mut Vec<f64>,
+    config: &AtRestConfig,
+) -> Option<(u16, f64)> {
+    let median = median(returns, config.deviation_max)?;
+    deviations.clear();
+    deviations.extend(returns.iter().map(|r| (r - median).abs()));
+    let deviation = (DEVIATIONS_IN_SD * self::median(deviations, config.deviation_max)?)
+        .clamp(config.deviation_min, config.deviation_max);
+    let agree =
+        returns.iter().filter(|r| (**r - median).abs() <= config.deviations_max * deviation);
+    let (count, sum) = agree.fold((0_u16, 0.0), |(n, sum), r| (n.saturating_add(1), sum + r));
+    Some((count, sum / f64::from(count)))
+}
+
+/// The middle one, or the mean of the two in the middle; if they are farther apart than `apart_max`,
+/// the lower: one that was read, not one between two surfaces.
+fn median(values: &mut [f64], apart_max: f64) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    match values.len() {
-        0 => f64::NAN,
-        n if n % 2 == 1 => values[middle],
-        _ => 0.5 * (values[middle - 1] + values[middle]),
-    }
+    let lower = *values.get(values.len().checked_sub(1)? / 2)?;
+    let upper = *values.get(values.len() / 2)?;
+    Some(if upper - lower > apart_max { lower } else { 0.5 * (lower + upper) })
 }
 
 #[cfg(test)]
@@ -259,6 +269,11 @@ mod tests {
         let of = |ranges: [f64; 4]| mean_of(&ranges.map(|r| scan(&[r]))).ranges[0];
         assert_eq!(of([2.0, 2.0, 8.0, 9.0]), 2.0);
         assert!(!scan(&[]).is_return(of([2.0, f64::INFINITY, 8.0, 0.0])));
+        // A beam beside an edge: what lies between the two surfaces is none.
+        assert!((of([2.0, 2.01, 4.0, 4.01]) - 2.005).abs() < 1e-12);
+        let three = |ranges: [f64; 3]| mean_of(&ranges.map(|r| scan(&[r]))).ranges[0];
+        assert!(!scan(&[]).is_return(three([2.0, 4.0, 8.0])), "one of three");
+        assert!(!scan(&[]).is_return(three([2.0, 3.0, 4.0])), "no two agree");
     }
 
     #[test]

@@ -11,6 +11,9 @@ use uuid::Uuid;
 use super::{PoseSource, SurveyorConfig};
 use crate::log::Reading;
 
+/// Counts changes of what the same readings come to within a version.
+const CONTENT: u32 = 2;
+
 /// Gives ids to the contributions of one surveyor.
 #[derive(Debug, Clone)]
 pub struct Identity {
@@ -29,6 +32,7 @@ impl Identity {
         };
         // What the same readings come to may change with every version.
         put(env!("CARGO_PKG_VERSION").as_bytes());
+        put(&CONTENT.to_be_bytes());
         put(config.robot.as_bytes());
         put(&config.source);
         put(&[u8::from(config.emulate_sonar)]);
@@ -67,6 +71,14 @@ impl Identity {
                 s.mount.y_m,
                 s.mount.heading_rad,
             ]);
+            if let Some(table) = &s.correction {
+                put(b"correction");
+                figures.extend(&table.distances_m);
+                figures.extend(&table.incidences_rad);
+                figures.extend(table.bias_m.iter().flatten());
+                figures.extend(table.sd_m.iter().flatten());
+                figures.push(table.incidence_max_rad);
+            }
         }
         if let Some(s) = &config.sensors.sonar {
             put(b"sonar");

@@ -167,12 +167,13 @@ fn blocks_of(cluster: &Cluster, resolution: f64) -> Vec<(TileIndex, Blocks)> {
 }
 
 /// Hull of all hulls, centroid averaged by points. Looks at one thing see different sides of it, and
-/// their pose errors may be shared: the covariance is that of the best look, it does not shrink.
+/// their pose errors may be shared: the covariance is the looks' own, averaged by points as well, which
+/// is no less than that of such a mean whatever they share (Jensen).
 fn fuse_group<'a>(group: impl Iterator<Item = (FeatureId, &'a Sight)>) -> Option<Cluster> {
     let mut corners = Vec::new();
     let mut sum = Point::zeros();
     let mut points: u64 = 0;
-    let mut least: Option<Matrix2<f64>> = None;
+    let mut spread = Matrix2::zeros();
     let mut robots = Vec::new();
     let (mut looks, mut last_look) = (0, None);
     let (mut first_seen_us, mut last_seen_us) = (i64::MAX, i64::MIN);
@@ -180,9 +181,7 @@ fn fuse_group<'a>(group: impl Iterator<Item = (FeatureId, &'a Sight)>) -> Option
         corners.extend_from_slice(&sight.hull);
         sum += sight.centroid * f64::from(sight.points);
         points += u64::from(sight.points);
-        if least.is_none_or(|c| sight.covariance.trace() < c.trace()) {
-            least = Some(sight.covariance);
-        }
+        spread += sight.covariance * f64::from(sight.points);
         if last_look != Some(id.contribution) {
             looks += 1;
             last_look = Some(id.contribution);
@@ -193,10 +192,13 @@ fn fuse_group<'a>(group: impl Iterator<Item = (FeatureId, &'a Sight)>) -> Option
     }
     robots.sort_unstable();
     robots.dedup();
+    if points == 0 {
+        return None;
+    }
     Some(Cluster {
         hull: convex_hull(&corners),
         centroid: sum / points as f64,
-        covariance: Covariance::symmetrised(least?),
+        covariance: Covariance::symmetrised(spread / points as f64),
         points,
         looks,
         robots,

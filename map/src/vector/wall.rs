@@ -62,7 +62,7 @@ impl Wall {
         let (line, independent, dependent, facing) = in_level_frame(&fused);
         let axes = Axes::of(&line);
         let mut seen = Vec::new();
-        let mut covers = Vec::new();
+        let mut covering: Vec<Vec<Interval>> = Vec::new();
         let mut openings = Vec::new();
         let mut ends = Vec::new();
         let mut robots = Vec::new();
@@ -73,13 +73,16 @@ impl Wall {
             let [sure_a, sure_b] = sighting.sure_ends(config).map(|p| axes.along(&p));
             let span = Interval::from_metres(sure_a, sure_b);
             seen.push(span);
-            covers.extend([(span.from, 1), (span.to, -1)]);
             ends.push(((a * 1e3).round() as i64, sighting.ends[0].kind));
             ends.push(((b * 1e3).round() as i64, sighting.ends[1].kind));
             if last_look != Some(id.contribution) {
                 looks += 1;
                 last_look = Some(id.contribution);
                 openings.push(Vec::new());
+                covering.push(Vec::new());
+            }
+            if let Some(of_look) = covering.last_mut() {
+                of_look.push(span);
             }
             // Two pieces of one look tell of the same opening between them: it counts once.
             if let Some(of_look) = openings.last_mut() {
@@ -95,7 +98,11 @@ impl Wall {
         robots.sort_unstable();
         robots.dedup();
         ends.sort_unstable();
-        let covers = counts(covers);
+        let covers = covering
+            .iter()
+            .flat_map(|of_look| union_intervals(of_look, 0))
+            .flat_map(|span| [(span.from, 1), (span.to, -1)]);
+        let covers = counts(covers.collect());
         let openings = openings
             .iter()
             .flat_map(|of_look| union_intervals(of_look, 0))

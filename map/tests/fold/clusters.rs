@@ -41,6 +41,20 @@ fn looks_at_one_thing_are_fused_and_those_at_two_are_not() {
     assert_eq!(clusters(&[thing(0, &NEAR), thing(1, &apart)]).len(), 2);
 }
 
+#[test]
+fn a_thing_is_known_no_better_than_the_looks_that_its_place_comes_from() {
+    // Sure of a few points, vague about many: the many decide where the thing is.
+    let sure = thing(0, &NEAR);
+    let mut vague = thing(1, &NEAR);
+    vague.clusters[0].points = 60;
+    vague.clusters[0].covariance = Covariance::from_variances([0.0064, 0.0064]);
+    let fused = clusters(&[sure, vague]);
+    assert_eq!(fused.len(), 1);
+    let sd = fused[0].covariance.sd(0);
+    // The poses' 5 mm come on top: sqrt((3 x 0.01^2 + 60 x 0.08^2) / 63 + 0.005^2 + ...).
+    assert!((0.078..0.085).contains(&sd), "{sd}");
+}
+
 /// Hits on the wall y = 3 and just before it.
 const ON_THE_WALL: [(f64, f64); 4] = [(2.0, 3.01), (2.5, 2.99), (2.3, 2.95), (2.1, 3.03)];
 

@@ -10,9 +10,9 @@ use mapfold_map::raster;
 use mapfold_map::vector::{ObservedCluster, ObservedEnd, ObservedSegment};
 use uuid::{Uuid, Variant};
 
-use super::Target;
 use super::number::read_instant;
 use super::violations::{Place, Violation, Violations};
+use super::{Limits, Target};
 use crate::instant::to_rfc3339;
 use crate::slug::is_slug;
 use crate::v1;
@@ -128,6 +128,7 @@ pub fn check_contribution(
         &mut wrong,
         |cluster, place, wrong| cluster::check(cluster, pose, limits, place, wrong),
     );
+    check_extents(segments.as_deref(), clusters.as_deref(), limits, &mut wrong);
     let evidence =
         evidence::check(&contribution.evidence, target, &root.field("evidence"), &mut wrong);
     let assembled = || {
@@ -144,6 +145,38 @@ pub fn check_contribution(
     };
     let assembled = assembled();
     wrong.none_or(assembled)
+}
+
+/// Whether all segments, and all clusters, are together no larger than one look can be.
+fn check_extents(
+    segments: Option<&[ObservedSegment]>,
+    clusters: Option<&[ObservedCluster]>,
+    limits: &Limits,
+    wrong: &mut Violations,
+) {
+    let root = Place::Root;
+    let length: f64 = segments.into_iter().flatten().map(|s| s.to - s.from).sum();
+    let most = limits.segments_length_max_m;
+    if length > most {
+        wrong.add(
+            &root.field("segments"),
+            "too_much_wall",
+            format_args!("{length:.0} m of wall in one look: {most} m is the most"),
+        );
+    }
+    let width = |cluster: &ObservedCluster| {
+        let reach = cluster.hull.iter().map(|p| (p - cluster.hull[0]).norm());
+        reach.fold(0.0, f64::max)
+    };
+    let widths: f64 = clusters.into_iter().flatten().map(width).sum();
+    let most = limits.clusters_width_max_m;
+    if widths > most {
+        wrong.add(
+            &root.field("clusters"),
+            "too_wide_clusters",
+            format_args!("clusters of {widths:.0} m together in one look: {most} m is the most"),
+        );
+    }
 }
 
 fn check_identity(contribution: &v1::Contribution, target: &Target, wrong: &mut Violations) {

@@ -59,8 +59,14 @@ fn segments(base: &Value, target: &Target) -> Vec<Fault> {
     let max = target.limits.coordinate_max_m;
     let at = Fault::at;
     let too_many = copies(base, "/segments/0", target.limits.segments_max + 1);
+    let mut much = copies(base, "/segments/0", 6);
+    for segment in much.as_array_mut().into_iter().flatten() {
+        segment["from_m"] = json!(-400);
+        segment["to_m"] = json!(400);
+    }
     vec![
         at("/segments", too_many, "too_many_segments", "more segments than one look has"),
+        at("/segments", much, "too_much_wall", "more metres of wall than one look sees"),
         at("/segments/0/rho_m", json!(-2), "negative", "a line at a negative distance"),
         at("/segments/0/rho_m", json!(1e300), "out_of_range", "a line outside the universe"),
         at("/segments/0/alpha_rad", json!(180), "out_of_range", "a normal in degrees"),
@@ -133,9 +139,15 @@ fn clusters(base: &Value, target: &Target) -> Vec<Fault> {
     let at = Fault::at;
     let hull = |points: Value, code, name| at("/clusters/0/hull_m", points, code, name);
     let too_many = copies(base, "/clusters/0", target.limits.clusters_max + 1);
+    let mut wide = copies(base, "/clusters/0", 6);
+    for cluster in wide.as_array_mut().into_iter().flatten() {
+        cluster["hull_m"] = json!([[-300, 0], [300, 0], [0, 2]]);
+        cluster["centroid_m"] = json!([0, 0.5]);
+    }
     let too_many_points = copies(base, "/clusters/0/hull_m/0", target.limits.hull_points_max + 1);
     vec![
         at("/clusters", too_many, "too_many_clusters", "more clusters than one look has"),
+        at("/clusters", wide, "too_wide_clusters", "things wider together than one look sees"),
         hull(json!([]), "empty_hull", "a hull without points"),
         hull(too_many_points, "too_many_hull_points", "a hull of very many points"),
         hull(json!([[3.0, 1.0], [3.25, 1.5], [3.5, 1.0]]), "not_convex", "a clockwise hull"),

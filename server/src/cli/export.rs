@@ -15,7 +15,7 @@ use crate::clock::SystemClock;
 use crate::config::Config;
 use crate::exchange::nav2::Nav2Map;
 use crate::level::{LevelOptions, Levels, Snapshot};
-use crate::running::open_store;
+use crate::running::open_existing_store;
 
 /// How long the rest of the log may take to be folded.
 const PATIENCE: Duration = Duration::from_mins(10);
@@ -24,7 +24,7 @@ pub(super) async fn run(
     config: &Config,
     command: &ExportCommand,
 ) -> Result<ExitCode, CommandError> {
-    let store = open_store(config).await?;
+    let store = open_existing_store(config).await?;
     let clock = Arc::new(SystemClock::start());
     let levels = Levels::new(store.clone(), clock, LevelOptions::default());
     let opened = levels.open(&command.site, &command.level).await?;

@@ -6,14 +6,14 @@ use super::args::VerifyCommand;
 use super::{CommandError, say};
 use crate::config::Config;
 use crate::maintenance::{self, Report};
-use crate::running::open_store;
+use crate::running::open_existing_store;
 use crate::store::Store;
 
 pub(super) async fn run(
     config: &Config,
     command: &VerifyCommand,
 ) -> Result<ExitCode, CommandError> {
-    let store = open_store(config).await?;
+    let store = open_existing_store(config).await?;
     let mut sound = true;
     for (site, level) in asked_for(&store, command).await? {
         match maintenance::verify(&store, &site, &level).await? {

@@ -16,7 +16,9 @@ use crate::store::{Store, StoreError, levels::LevelRow};
 const NO_LIMITS: Limits = Limits {
     coordinate_max_m: f64::MAX,
     segments_max: usize::MAX,
+    segments_length_max_m: f64::MAX,
     clusters_max: usize::MAX,
+    clusters_width_max_m: f64::MAX,
     hull_points_max: usize::MAX,
     tiles_max: usize::MAX,
     evidence_max: i32::MAX,

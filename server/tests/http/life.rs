@@ -174,6 +174,9 @@ async fn a_backup_is_a_database_that_verifies() {
     let verified = run(folder, &["verify", "--data-dir", &copied]);
     assert!(verified.status.success(), "{verified:?}");
     assert!(printed(&verified).contains("; 1 contributions, "));
+    let elsewhere = run(folder, &["verify", "--site", "a", "--level", "b"]);
+    assert!(!elsewhere.status.success(), "{elsewhere:?}");
+    assert!(String::from_utf8_lossy(&elsewhere.stderr).contains("no level"), "{elsewhere:?}");
     server.shutdown().await;
 }
 
@@ -187,8 +190,9 @@ fn a_program_that_is_called_wrongly_says_so() {
         (vec!["--log", "a=b=c"], 1, "log"),
         (vec!["import", "x"], 2, "import"),
         (vec!["export", "dxf"], 2, "dxf"),
-        (vec!["export", "geojson", "--site", "a", "--level", "b", "--out", "x"], 1, "no level"),
-        (vec!["verify", "--site", "a", "--level", "b"], 1, "no level"),
+        (vec!["export", "geojson", "--site", "a", "--level", "b", "--out", "x"], 1, "no database"),
+        (vec!["verify", "--site", "a", "--level", "b"], 1, "no database"),
+        (vec!["backup", "x"], 1, "no database"),
         (vec!["token", "create", "--scope", "map:read", "--site", "a"], 1, "no site"),
         (vec!["token", "create", "--scope", "map:read", "--robot", "a"], 2, "--site"),
     ] {
