@@ -162,10 +162,9 @@ impl Corrector {
         for spot in &mut self.spots {
             let reading = scan.ranges[spot.beam];
             // What the table does not cover is dropped at the end; its place is still telling.
-            let share = scan.variance_share(spot.beam);
-            let found = corrected(&self.table, reading, share, spot.incidence);
+            let found = corrected(&self.table, reading, 1.0, spot.incidence);
             (spot.range, spot.variance) =
-                found.map_or((reading, spot.variance), |(c, _)| (c.range, share * c.variance));
+                found.map_or((reading, spot.variance), |(c, _)| (c.range, c.variance));
         }
         self.find_incidences(self.config.sides_rms);
         let count = self.spots.len() - 2 * overlap;
@@ -202,9 +201,9 @@ impl Corrector {
         }
         for (beam, _) in states.iter().enumerate().filter(|(_, s)| **s == BeamState::Hit) {
             let range = scan.ranges[beam];
-            // Noise as if met squarely; a reading far outside the table is none of its own.
-            let variance =
-                self.table.variance_met_squarely(range).unwrap_or(0.0) * scan.variance_share(beam);
+            // Noise as if met squarely; a reading far outside the table is none of its own. Means of
+            // several readings have less, but are off their line by the bends of the table as well.
+            let variance = self.table.variance_met_squarely(range).unwrap_or(0.0);
             self.spots.push(Spot {
                 beam,
                 direction: self.directions.1[beam],

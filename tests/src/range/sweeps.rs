@@ -40,7 +40,7 @@ pub struct Sample {
 }
 
 /// Sweeps that a robot takes while it stands.
-pub const AT_REST: usize = 5;
+pub const AT_REST: usize = 8;
 
 /// A straight wall 0.8 to 2.2 m away, turned by up to 30 degrees.
 fn wall(noise: &mut Noise) -> World {
