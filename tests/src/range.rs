@@ -38,11 +38,9 @@ const BIN: (f64, f64) = (0.5, 10.0);
 /// 3000 is certain to half a millimetre.
 const BIN_READINGS_MIN: usize = 3000;
 
-/// 99 of 100 corrected ranges of the design's walls are better than this, metres.
+/// 99 of 100 corrected ranges of the design's walls are better than this, metres, and those of a robot at
+/// rest ([`AT_REST`] sweeps) at every incidence; a single sweep cannot be where noise alone is not.
 pub const P99_MAX_M: f64 = 0.045;
-/// At every incidence up to [`STEEPEST_DEG`], 99 of 100 corrected ranges of a robot at rest
-/// ([`AT_REST`] sweeps) are better than [`P99_MAX_M`] as well; those of a single sweep cannot be where noise
-/// alone is not.
 /// The bias of a bin is less, metres.
 pub const BIAS_MAX_M: f64 = 0.003;
 /// At every incidence, the p99 of corrected ranges is less than so many times that of noise alone:
