@@ -59,24 +59,24 @@ pub(super) fn fuse<'a>(
     // Once somebody has localized on the map, the error of a fix on surveyed landmarks that is in it
     // may be in other poses too.
     let fixes_are_own = sightings.clone().all(|(_, s)| s.is_datum);
-    let fed_back =
-        if fixes_are_own { 0.0 } else { fed_back(count_looks(sightings.clone()), config.fed_back) };
-    let looks = one_per_look(sightings.map(|(id, s)| {
+    let mut looks = one_per_look(sightings.map(|(id, s)| {
         let (offset, lever) = s.offset_about(&anchor);
-        let (own, fix, shared) = if fixes_are_own {
-            (s.independent, s.own_fix, s.dependent)
-        } else {
-            let shared = s.dependent + s.own_fix + s.independent * fed_back;
-            (s.independent * (1.0 - fed_back), Matrix2::zeros(), shared)
-        };
         Estimate {
             look: id.contribution,
             z: Vector2::new(offset, difference(s.alpha, reference.alpha)),
-            own: about(&own, lever),
-            fix: about(&fix, lever),
-            shared: about(&shared, lever),
+            own: about(&s.independent, lever),
+            fix: about(&s.own_fix, lever),
+            shared: about(&s.dependent, lever),
         }
     }));
+    if !fixes_are_own {
+        let fed_back = fed_back(looks.len(), config.fed_back);
+        for Estimate { own, fix, shared, .. } in &mut looks {
+            *shared += *fix + *own * fed_back;
+            *own *= 1.0 - fed_back;
+            *fix = Matrix2::zeros();
+        }
+    }
     let weights: Vec<f64> =
         looks.iter().map(|e| 1.0 / scaled_trace(&(e.own + e.fix + e.shared), config)).collect();
     let total: f64 = weights.iter().sum();
@@ -109,28 +109,20 @@ pub(super) fn fuse<'a>(
     })
 }
 
-/// Of so many looks, those that are distinct.
-fn count_looks<'a>(sightings: impl Iterator<Item = (FeatureId, &'a Sighting)>) -> u32 {
-    let mut last = None;
-    let new =
-        |(id, _): &(FeatureId, &Sighting)| last.replace(id.contribution) != Some(id.contribution);
-    sightings.filter(new).count() as u32
-}
-
 /// The share of each look's sensor covariance that counts as shared among `looks` looks, so that
 /// their fusion claims what is left of it when every pose takes over `weight` of the error that the
 /// wall has by then: the mean of n looks then errs by
 /// `x_n = x_(n-1) (1 - (1 - weight) / n) + e_n / n`.
-fn fed_back(looks: u32, weight: f64) -> f64 {
+fn fed_back(looks: usize, weight: f64) -> f64 {
     if looks < 2 {
         return 1.0;
     }
     let mut variance = 1.0;
-    for n in (2..=looks).map(f64::from) {
+    for n in (2..=looks).map(|n| n as f64) {
         variance = variance * (1.0 - (1.0 - weight) / n).powi(2) + 1.0 / (n * n);
     }
     // Averaging what is not shared leaves 1 / n of it.
-    let averaged = 1.0 / f64::from(looks);
+    let averaged = 1.0 / looks as f64;
     ((variance - averaged) / (1.0 - averaged)).clamp(0.0, 1.0)
 }
 
@@ -183,14 +175,14 @@ mod tests {
             let mut square = 0.0;
             for _ in 0..runs {
                 let mut mean = uniform(&mut state);
-                for n in (2..=looks).map(f64::from) {
+                for n in (2..=looks).map(|n| n as f64) {
                     let seen = 0.5 * mean + uniform(&mut state);
                     mean += (seen - mean) / n;
                 }
                 square += mean * mean / f64::from(runs);
             }
             let shared = fed_back(looks, 0.5);
-            let claimed = shared + (1.0 - shared) / f64::from(looks);
+            let claimed = shared + (1.0 - shared) / looks as f64;
             assert!((square / claimed - 1.0).abs() < 0.04, "{looks}: {square} for {claimed}");
         }
     }

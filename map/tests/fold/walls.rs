@@ -138,6 +138,25 @@ fn a_doorway_that_robots_look_through_is_open_and_closes_when_the_evidence_is_ta
 }
 
 #[test]
+fn all_pieces_of_a_wall_in_one_look_have_a_say_in_its_line() {
+    // Two pieces of one wall on either side of the robot, whose lines lie a little apart.
+    let pieces = [
+        (Point::new(1.0, 3.0), Point::new(2.97, 3.0)),
+        (Point::new(3.03, 3.01), Point::new(5.0, 3.01)),
+    ];
+    for provenance in [Provenance::SharedMap, Provenance::Datum] {
+        let seen =
+            look(0, &pieces, Point::new(3.0, 1.0), Noise { offset: 0.01, angle: 0.008, ..EXACT });
+        let level = folded(&[Contribution { provenance, ..seen.clone() }]);
+        let segments = seen.segments.iter().rev().cloned().collect();
+        let turned = folded(&[Contribution { provenance, segments, ..seen.clone() }]);
+        let at = |level: &Level| only(level).line.across(&Point::new(3.0, 3.0));
+        let (one, other) = (at(&level), at(&turned));
+        assert!((one - other).abs() < 1e-3, "{provenance:?}: {one} or {other}");
+    }
+}
+
+#[test]
 fn what_a_look_saw_through_is_not_bridged_and_several_open_what_others_claim() {
     let pieces = [
         (Point::new(1.0, 3.0), Point::new(2.97, 3.0)),
