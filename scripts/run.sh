@@ -31,6 +31,8 @@ trap stop_all EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM
 
+# What an earlier server said of being ready must not be taken for this one's.
+rm -f "$data_dir/server.log"
 MAPFOLD_ADMIN_TOKEN=$token "$programs/mapfold-server" serve \
     --listen "$listen" --data-dir "$data_dir" >"$data_dir/server.log" 2>&1 </dev/null &
 server_job=$!
