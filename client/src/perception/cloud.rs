@@ -33,6 +33,16 @@ impl Cloud {
         }));
     }
 
+    /// The points of a stretch but for its strays.
+    pub(super) fn without<'a>(
+        &'a self,
+        stretch: &Range<usize>,
+        stray: &'a [bool],
+    ) -> impl Iterator<Item = &'a ScanPoint> + Clone + use<'a> {
+        let points = self.points[stretch.clone()].iter().zip(&stray[stretch.clone()]);
+        points.filter_map(|(point, stray)| (!stray).then_some(point))
+    }
+
     /// Sums over a stretch.
     pub(super) fn sums(&self, stretch: &Range<usize>) -> Sums {
         self.sums[stretch.end].without(&self.sums[stretch.start])

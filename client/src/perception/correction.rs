@@ -13,8 +13,11 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use mapfold_map::geometry::Point;
+
 use super::BeamState;
-use crate::sensor::{CorrectedRange, RangeTable, Scan, ScanGeometry, ScannerProfile};
+use super::points::Directions;
+use crate::sensor::{CorrectedRange, RangeTable, Scan, ScannerProfile};
 
 /// How incidences are found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,8 +83,7 @@ pub struct Corrector {
     steepest: f64,
     /// One over every number of points that a line may have.
     shares: Vec<f64>,
-    /// Where the beams of the last scan pointed; those of the next mostly point there too.
-    directions: (Option<ScanGeometry>, Vec<(f64, f64)>),
+    directions: Directions,
     sums: Vec<Sums>,
     spots: Vec<Spot>,
 }
@@ -90,7 +92,7 @@ pub struct Corrector {
 #[derive(Debug, Clone, Copy)]
 struct Spot {
     beam: usize,
-    direction: (f64, f64),
+    direction: Point,
     range: f64,
     variance: f64,
     /// First and last spot of the surface that it may lie on.
@@ -126,7 +128,7 @@ impl Corrector {
             steepest: config.surface_incidence_max.tan(),
             shares: (0..=2 * config.neighbours + 1).map(|n| 1.0 / (n.max(1) as f64)).collect(),
             config,
-            directions: (None, Vec::new()),
+            directions: Directions::default(),
             sums: Vec::new(),
             spots: Vec::new(),
         })
@@ -190,15 +192,7 @@ impl Corrector {
     /// first, and its first after the last. Answers how many are repeated at each end.
     fn gather(&mut self, scan: &Scan, states: &[BeamState]) -> usize {
         self.spots.clear();
-        let (known, directions) = &mut self.directions;
-        if *known != Some(scan.geometry) || directions.len() < states.len() {
-            directions.clear();
-            directions.extend((0..states.len()).map(|beam| {
-                let direction = scan.direction(beam);
-                (direction.x, direction.y)
-            }));
-            *known = Some(scan.geometry);
-        }
+        let directions = self.directions.of(scan);
         for (beam, _) in states.iter().enumerate().filter(|(_, s)| **s == BeamState::Hit) {
             let range = scan.ranges[beam];
             // Noise as if met squarely; a reading far outside the table is none of its own. Means of
@@ -206,7 +200,7 @@ impl Corrector {
             let variance = self.table.variance_met_squarely(range).unwrap_or(0.0);
             self.spots.push(Spot {
                 beam,
-                direction: self.directions.1[beam],
+                direction: directions[beam],
                 range,
                 variance,
                 run: (0, 0),
@@ -249,7 +243,7 @@ impl Corrector {
         let mut sum = Sums::default();
         self.sums.push(sum);
         for spot in &self.spots {
-            let (x, y) = (spot.range * spot.direction.0, spot.range * spot.direction.1);
+            let (x, y) = (spot.range * spot.direction.x, spot.range * spot.direction.y);
             sum.x += x;
             sum.y += y;
             sum.xx += x * x;
@@ -281,7 +275,7 @@ impl Corrector {
     }
 
     /// The line through the spots `from..=to`, as a beam of this direction meets it.
-    fn local_line(&self, direction: (f64, f64), from: usize, to: usize) -> Option<LocalLine> {
+    fn local_line(&self, direction: Point, from: usize, to: usize) -> Option<LocalLine> {
         let count = to + 1 - from;
         if count < self.config.points_min {
             return None;
@@ -301,7 +295,7 @@ impl Corrector {
         }
         // Range noise across the line, in the ratio of the squares of the cosine of the incidence.
         // cos of twice the angle between beam and line is that of twice the incidence, negative.
-        let (ex, ey) = direction;
+        let (ex, ey) = (direction.x, direction.y);
         let twice = (d * (ex * ex - ey * ey) + 4.0 * xy * ex * ey) / length;
         let cosine_sq = (0.5 * (1.0 - twice)).clamp(0.0, 1.0);
         // A beam along the line still has some noise across.

@@ -4,41 +4,37 @@ use std::ops::Range;
 
 use super::cloud::Cloud;
 use super::guess::Guess;
+use super::points::ScanPoint;
 
-/// The guess, or a better one of the same points, that explains them.
+/// The guess, or a better one of the same points, that explains them: those of a stretch but for its
+/// strays.
 pub(super) fn explaining(
     cloud: &Cloud,
-    points: &Range<usize>,
+    stretch: &Range<usize>,
     stray: &[bool],
     guess: &Guess,
     sds: f64,
     z: f64,
 ) -> Option<Guess> {
-    if explains(cloud, points, stray, guess, sds, z) {
+    let own = || cloud.without(stretch, stray);
+    if explains(own(), guess, sds, z) {
         return Some(*guess);
     }
-    let all = cloud.points[points.clone()].iter().zip(&stray[points.clone()]);
-    let own = all.filter_map(|(point, stray)| (!stray).then_some(point));
-    let refined = guess.refined(own)?;
-    explains(cloud, points, stray, &refined, sds, z).then_some(refined)
+    let refined = guess.refined(own())?;
+    explains(own(), &refined, sds, z).then_some(refined)
 }
 
 /// Whether a line lies within so many deviations of each of its points, and within what chance
 /// allows of all together.
-fn explains(
-    cloud: &Cloud,
-    points: &Range<usize>,
-    stray: &[bool],
+fn explains<'a>(
+    points: impl Iterator<Item = &'a ScanPoint>,
     guess: &Guess,
     sds: f64,
     z: f64,
 ) -> bool {
     let limit = sds * sds;
     let (mut chi_sq, mut count) = (0.0, 0_usize);
-    for (point, stray) in cloud.points[points.clone()].iter().zip(&stray[points.clone()]) {
-        if *stray {
-            continue;
-        }
+    for point in points {
         let squared = guess.normalised_sq(point);
         if squared > limit {
             return false;

@@ -89,7 +89,7 @@ impl ScanPoint {
 }
 
 /// Where the beams of a scanner point, remembered from scan to scan.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Directions {
     geometry: Option<ScanGeometry>,
     along: Vec<Point>,

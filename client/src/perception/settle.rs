@@ -71,13 +71,10 @@ impl Splitter {
         guess: &Guess,
         config: &Config,
     ) -> Option<LineFit> {
-        let points = &cloud.points[range.clone()];
         if strays == 0 {
-            return fit_from(&points.iter(), guess, &config.fit).ok();
+            return fit_from(&cloud.points[range.clone()].iter(), guess, &config.fit).ok();
         }
-        let stray = &self.stray[range.clone()];
-        let own = points.iter().zip(stray).filter_map(|(p, stray)| (!stray).then_some(p));
-        fit_from(&own, guess, &config.fit).ok()
+        fit_from(&cloud.without(range, &self.stray), guess, &config.fit).ok()
     }
 }
 
