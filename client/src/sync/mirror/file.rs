@@ -19,6 +19,7 @@ use mapfold_map::level::{LevelMap, apply, diff};
 use mapfold_schema::border::{map_patch, wire_patch};
 use mapfold_schema::codec;
 use mapfold_schema::v1;
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use uuid::Uuid;
@@ -40,22 +41,24 @@ pub(super) struct Saved {
     pub(super) known: KnownMap,
 }
 
-/// What files of every version begin with.
-#[derive(Deserialize)]
-struct Head {
+/// The payload; all but the map is the same in every version.
+#[derive(Serialize, Deserialize)]
+struct Content<M> {
     site: String,
     level: String,
     frame: Uuid,
     resolution_m: f64,
+    map: M,
 }
 
-#[derive(Serialize, Deserialize)]
-struct Content {
-    site: String,
-    level: String,
-    frame: Uuid,
-    resolution_m: f64,
-    map: v1::Patch,
+impl<M> Content<M> {
+    fn saved(self, known: KnownMap) -> Saved {
+        Saved {
+            level: LevelAddress { site: self.site, level: self.level },
+            ground: Ground { frame: self.frame, resolution_m: self.resolution_m },
+            known,
+        }
+    }
 }
 
 /// Why a file cannot be used.
@@ -124,17 +127,13 @@ fn decode(bytes: &[u8]) -> Result<Saved, String> {
         return Err("its checksum does not fit".to_owned());
     }
     let cbor = zstd::stream::decode_all(payload).map_err(|e| e.to_string())?;
-    let head: Head = codec::from_cbor(&cbor).map_err(|e| e.to_string())?;
-    let mut known = KnownMap::default();
-    if version == VERSION {
-        let content: Content = codec::from_cbor(&cbor).map_err(|e| e.to_string())?;
-        let patch = map_patch(&content.map).map_err(|violations| format!("{violations:?}"))?;
-        apply(&patch, &mut known.map);
-        known.revision = content.map.revision;
+    if version < VERSION {
+        let content: Content<IgnoredAny> = codec::from_cbor(&cbor).map_err(|e| e.to_string())?;
+        return Ok(content.saved(KnownMap::default()));
     }
-    Ok(Saved {
-        level: LevelAddress { site: head.site, level: head.level },
-        ground: Ground { frame: head.frame, resolution_m: head.resolution_m },
-        known,
-    })
+    let content: Content<v1::Patch> = codec::from_cbor(&cbor).map_err(|e| e.to_string())?;
+    let patch = map_patch(&content.map).map_err(|violations| format!("{violations:?}"))?;
+    let mut known = KnownMap { revision: content.map.revision, ..KnownMap::default() };
+    apply(&patch, &mut known.map);
+    Ok(content.saved(known))
 }
