@@ -11,6 +11,7 @@ use mapfold_map::geometry::Pose;
 
 use crate::log::{Observation, Reading};
 use crate::sensor::Scan;
+use crate::sensor::robust::{SD_PER_MEDIAN_DEVIATION, middle};
 
 /// When a robot stands, and which readings of a stop agree.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,8 +26,8 @@ pub struct AtRestConfig {
     pub scans_min: usize,
     /// A longer stop is several looks.
     pub scans_max: usize,
-    /// Readings that deviate from the median by more than this many deviations (1.4826 times the
-    /// median absolute deviation) are left out.
+    /// Readings that are off the median by more than this many deviations, by the median of these,
+    /// are left out.
     pub deviations_max: f64,
     /// Least such deviation, metres: heads that tell whole centimetres seem to have none.
     pub deviation_min: f64,
@@ -47,9 +48,6 @@ impl AtRestConfig {
         deviation_max: 0.1,
     };
 }
-
-/// Median absolute deviations of a normal distribution in its standard deviation (Hampel 1974).
-const DEVIATIONS_IN_SD: f64 = 1.4826;
 
 /// Makes one scan of all that were taken in each stop; other readings stay. Readings are numbered
 /// anew.
@@ -83,14 +81,10 @@ fn stands(first: &Reading, last: &Reading, next: &Reading, config: &AtRestConfig
         let moved = a.inverse().compose(b);
         moved.position().norm() <= config.moved_max && moved.heading().abs() <= config.turned_max
     }
-    let by_log = match (&first.level_from_robot, &next.level_from_robot) {
-        (Some(a), Some(b)) => Some(near(a, b, config)),
-        _ => None,
-    };
-    let by_wheels = match (&first.odom_from_robot, &next.odom_from_robot) {
-        (Some(a), Some(b)) => Some(near(a, b, config)),
-        _ => None,
-    };
+    let by_log = first.level_from_robot.as_ref().zip(next.level_from_robot.as_ref());
+    let by_wheels = first.odom_from_robot.as_ref().zip(next.odom_from_robot.as_ref());
+    let by_log = by_log.map(|(a, b)| near(a, b, config));
+    let by_wheels = by_wheels.map(|(a, b)| near(a, b, config));
     let alike = match (&last.observation, &next.observation) {
         (Observation::Scan(a), Observation::Scan(b)) => {
             a.geometry == b.geometry
@@ -130,7 +124,7 @@ fn end(stop: &mut Vec<Reading>, settled: &mut Vec<Reading>, config: &AtRestConfi
 /// The scan that scans of one stop come to, beam by beam; `None` if they are too few. A beam has a
 /// return if at least half of them agree on one.
 pub fn mean(scans: &[&Scan], config: &AtRestConfig) -> Option<Scan> {
-    let (first, _) = scans.split_first().filter(|_| scans.len() >= config.scans_min)?;
+    let first = scans.first().filter(|_| scans.len() >= config.scans_min)?;
     let mut settled = Scan { repeats: Vec::with_capacity(first.ranges.len()), ..(*first).clone() };
     let (mut returns, mut deviations) = (Vec::new(), Vec::new());
     for beam in 0..first.ranges.len() {
@@ -158,7 +152,7 @@ fn agreed(
     let median = median(returns, config.deviation_max)?;
     deviations.clear();
     deviations.extend(returns.iter().map(|r| (r - median).abs()));
-    let deviation = (DEVIATIONS_IN_SD * self::median(deviations, config.deviation_max)?)
+    let deviation = (SD_PER_MEDIAN_DEVIATION * self::median(deviations, config.deviation_max)?)
         .clamp(config.deviation_min, config.deviation_max);
     let agree =
         returns.iter().filter(|r| (**r - median).abs() <= config.deviations_max * deviation);
@@ -170,9 +164,8 @@ fn agreed(
 /// the lower: one that was read, not one between two surfaces.
 fn median(values: &mut [f64], apart_max: f64) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
-    let lower = *values.get(values.len().checked_sub(1)? / 2)?;
-    let upper = *values.get(values.len() / 2)?;
-    Some(if upper - lower > apart_max { lower } else { 0.5 * (lower + upper) })
+    let [lower, upper] = middle(values)?;
+    Some(if upper - lower > apart_max { lower } else { f64::midpoint(lower, upper) })
 }
 
 #[cfg(test)]

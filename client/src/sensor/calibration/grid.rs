@@ -1,6 +1,7 @@
 //! The grid of a calibration: its nodes' distances and incidences, and what was measured there.
 
 use super::{CalibrationConfig, CalibrationError, TargetReading, TargetReadings};
+use crate::sensor::robust::{SD_PER_MEDIAN_DEVIATION, median};
 
 /// What the readings of one node say.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -135,11 +136,6 @@ fn nearest(nodes: &[f64], value: f64) -> usize {
     if value - nodes[before] < nodes[after] - value { before } else { after }
 }
 
-fn median(sorted: &[f64]) -> f64 {
-    let half = sorted.len() / 2;
-    if sorted.len() % 2 == 1 { sorted[half] } else { f64::midpoint(sorted[half - 1], sorted[half]) }
-}
-
 /// What the readings of a node say, if they are enough, and how many were left out.
 fn cell(
     readings: &[&TargetReading],
@@ -152,16 +148,13 @@ fn cell(
     for surface in 0..surfaces {
         let of_surface = readings.iter().filter(|r| r.surface == surface);
         let mut errors: Vec<f64> = of_surface.map(|r| error(r)).collect();
-        if errors.is_empty() {
-            continue;
-        }
         errors.sort_unstable_by(f64::total_cmp);
-        let middle = median(&errors);
+        let Some(middle) = median(&errors) else { continue };
         let mut off: Vec<f64> = errors.iter().map(|e| (e - middle).abs()).collect();
         off.sort_unstable_by(f64::total_cmp);
-        // 1.4826 times the median deviation is the standard deviation of normal noise; a
-        // millimetre at the least, for readings in coarse steps may all be the same.
-        let gate = config.outlier_sds * (1.4826 * median(&off)).max(0.001);
+        let sd = SD_PER_MEDIAN_DEVIATION * median(&off).unwrap_or(0.0);
+        // A millimetre at the least, for readings in coarse steps may all be the same.
+        let gate = config.outlier_sds * sd.max(0.001);
         let all = errors.len();
         errors.retain(|e| (e - middle).abs() <= gate);
         outliers += all - errors.len();
