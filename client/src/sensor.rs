@@ -8,6 +8,7 @@ pub mod calibration;
 mod preset;
 mod profile;
 mod reading;
+pub(crate) mod robust;
 mod table;
 
 pub use preset::{PRESETS, preset};

@@ -16,6 +16,7 @@ use mapfold_map::level::Provenance;
 use mapfold_map::raster::SensorClass;
 use mapfold_schema::border::{DEFAULT_LIMITS, Target, check_contribution};
 use mapfold_schema::codec::to_cbor;
+use mapfold_schema::v1::RangeCorrection;
 use proptest::prelude::*;
 use uuid::Uuid;
 
@@ -102,6 +103,24 @@ fn most_of_what_killian_saw_is_explained_by_walls_and_clusters() {
     assert!((4..9).contains(&(walls / 388)), "{walls} walls in 388 scans");
     assert!(share(on_wall) > 0.75, "on walls: {}", share(on_wall));
     assert!(share(on_wall + in_cluster) > 0.88, "explained: {}", share(on_wall + in_cluster));
+}
+
+#[test]
+fn a_scanner_that_is_corrected_otherwise_gives_other_contributions() {
+    let log = log("killian.log.gz");
+    let corrected = |bias_m: f64| {
+        let mut sensors = preset("sick-pls").unwrap();
+        sensors.scanner.as_mut().unwrap().correction = Some(RangeCorrection {
+            distances_m: vec![0.5, 50.0],
+            incidences_rad: vec![0.0],
+            bias_m: vec![vec![bias_m; 2]],
+            sd_m: vec![vec![0.01; 2]],
+            incidence_max_rad: 0.0,
+        });
+        Surveyor::new(config(&log, sensors), 0).unwrap().id(&log.readings[0])
+    };
+    assert_eq!(corrected(0.02), corrected(0.02));
+    assert_ne!(corrected(0.02), corrected(0.03));
 }
 
 #[test]

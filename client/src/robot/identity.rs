@@ -5,11 +5,13 @@
 //! not among them: the same log played into two servers gives the same ids.
 
 use mapfold_map::level::{ContributionId, Provenance};
+use mapfold_schema::v1::RangeCorrection;
 use sha2::{Digest, Sha256};
 use uuid::Uuid;
 
-use super::{PoseSource, SurveyorConfig};
+use super::{OdometryNoise, PoseSd, PoseSource, SurveyorConfig};
 use crate::log::Reading;
+use crate::sensor::{MountedAt, ScannerProfile, Sensors, SonarProfile};
 
 /// Counts changes of what the same readings come to within a version.
 const CONTENT: u32 = 2;
@@ -24,6 +26,18 @@ impl Identity {
     /// The ids under these settings; `first` is the number of the reading at which dead reckoning
     /// starts.
     pub fn new(config: &SurveyorConfig, first: u32) -> Self {
+        // Taken apart to the last field: one that is new cannot be forgotten here.
+        let SurveyorConfig {
+            robot,
+            sensors: Sensors { scanner, sonar },
+            emulate_sonar,
+            poses,
+            pose_sd: PoseSd { position_m, heading_rad },
+            provenance,
+            odometry: OdometryNoise { along, across, turn_per_metre, turn_per_turn },
+            resolution,
+            source,
+        } = config;
         let mut settings = Sha256::new();
         let mut put = |bytes: &[u8]| {
             // Lengths first: no two lists of fields read the same.
@@ -33,63 +47,66 @@ impl Identity {
         // What the same readings come to may change with every version.
         put(env!("CARGO_PKG_VERSION").as_bytes());
         put(&CONTENT.to_be_bytes());
-        put(config.robot.as_bytes());
-        put(&config.source);
-        put(&[u8::from(config.emulate_sonar)]);
-        put(&[match config.provenance {
+        put(robot.as_bytes());
+        put(source);
+        put(&[u8::from(*emulate_sonar)]);
+        put(&[match provenance {
             Provenance::Datum => 0,
             Provenance::SharedMap => 1,
             Provenance::Odometry => 2,
         }]);
-        let noise = &config.odometry;
-        let mut figures = vec![
-            config.resolution,
-            config.pose_sd.position_m,
-            config.pose_sd.heading_rad,
-            noise.along,
-            noise.across,
-            noise.turn_per_metre,
-            noise.turn_per_turn,
-        ];
-        match config.poses {
+        let mut figures = vec![*resolution, *position_m, *heading_rad];
+        figures.extend([along, across, turn_per_metre, turn_per_turn]);
+        match poses {
             PoseSource::Log => put(b"log"),
             PoseSource::Odometry => {
                 put(b"odometry");
                 figures.push(f64::from(first));
             }
         }
-        if let Some(s) = &config.sensors.scanner {
+        if let Some(scanner) = scanner {
+            let ScannerProfile {
+                model: _,
+                range_min_m,
+                range_max_m,
+                range_sd_m,
+                range_sd_per_m,
+                bearing_sd_rad,
+                systematic_sd_m,
+                mount,
+                correction,
+            } = scanner;
             put(b"scanner");
-            figures.extend([
-                s.range_min_m,
-                s.range_max_m,
-                s.range_sd_m,
-                s.range_sd_per_m,
-                s.bearing_sd_rad,
-                s.systematic_sd_m,
-                s.mount.x_m,
-                s.mount.y_m,
-                s.mount.heading_rad,
-            ]);
-            if let Some(table) = &s.correction {
+            figures.extend([range_min_m, range_max_m, range_sd_m, range_sd_per_m]);
+            figures.extend([bearing_sd_rad, systematic_sd_m]);
+            figures.extend(placed(mount));
+            if let Some(table) = correction {
+                let RangeCorrection {
+                    distances_m,
+                    incidences_rad,
+                    bias_m,
+                    sd_m,
+                    incidence_max_rad,
+                } = table;
                 put(b"correction");
-                figures.extend(&table.distances_m);
-                figures.extend(&table.incidences_rad);
-                figures.extend(table.bias_m.iter().flatten());
-                figures.extend(table.sd_m.iter().flatten());
-                figures.push(table.incidence_max_rad);
+                figures.extend(distances_m.iter().chain(incidences_rad));
+                figures.extend(bias_m.iter().chain(sd_m).flatten());
+                figures.push(*incidence_max_rad);
             }
         }
-        if let Some(s) = &config.sensors.sonar {
+        if let Some(sonar) = sonar {
+            let SonarProfile {
+                model: _,
+                range_min_m,
+                range_max_m,
+                range_sd_m,
+                range_sd_per_m,
+                cone_rad,
+                transducers,
+            } = sonar;
             put(b"sonar");
-            figures.extend([
-                s.range_min_m,
-                s.range_max_m,
-                s.range_sd_m,
-                s.range_sd_per_m,
-                s.cone_rad,
-            ]);
-            figures.extend(s.transducers.iter().flat_map(|t| [t.x_m, t.y_m, t.heading_rad]));
+            figures.extend([range_min_m, range_max_m, range_sd_m, range_sd_per_m, cone_rad]);
+            figures.extend(transducers.iter().flat_map(placed));
         }
         for figure in figures {
             put(&figure.to_be_bytes());
@@ -106,6 +123,11 @@ impl Identity {
         let uuid: Uuid = uuid::Builder::from_unix_timestamp_millis(millis, &chance).into_uuid();
         ContributionId(uuid.into_bytes())
     }
+}
+
+fn placed(mount: &MountedAt) -> [f64; 3] {
+    let MountedAt { x_m, y_m, heading_rad } = *mount;
+    [x_m, y_m, heading_rad]
 }
 
 /// When the reading was taken, in microseconds since 1970; logs that count from zero were taken
