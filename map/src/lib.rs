@@ -64,6 +64,8 @@
 //! * [`raster`]: integer log-odds evidence and the tiles it adds up in.
 //! * [`level`]: contributions, the fold, and patches between two revisions.
 
+#[cfg(test)]
+mod chance;
 pub mod geometry;
 pub mod level;
 pub mod raster;

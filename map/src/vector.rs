@@ -11,6 +11,7 @@
 //! What depends on what is found in a few places of memory, however large the level is: by numbered
 //! places (`slots`), by squares of the level (`squares`, `ends`), by blocks of cells (`by_block`).
 
+mod buckets;
 mod by_block;
 mod chain;
 mod chains;

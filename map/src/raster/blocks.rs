@@ -74,14 +74,12 @@ impl Blocks {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chance::Chance;
 
     #[test]
     fn a_patch_touches_the_blocks_of_its_cells_and_no_others() {
-        let mut state = 3_u64;
-        let mut chance = |upto: usize| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            (state >> 33) as usize % upto
-        };
+        let mut chance = Chance(3);
+        let mut chance = |upto: usize| (chance.share() * upto as f64) as usize;
         for _ in 0..200 {
             let mut cells = Box::new([0_i16; TILE_CELLS]);
             for _ in 0..3 {

@@ -72,6 +72,7 @@ fn meet((a, b): (Point, Point), (c, d): (Point, Point)) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chance::Chance;
 
     fn points(list: &[(f64, f64)]) -> Vec<Point> {
         list.iter().map(|(x, y)| Point::new(*x, *y)).collect()
@@ -106,11 +107,8 @@ mod tests {
 
     #[test]
     fn the_sweep_finds_what_comparing_all_pairs_finds() {
-        let mut state = 7_u64;
-        let mut chance = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            ((state >> 40) as f64 / (1_u64 << 24) as f64 * 8.0).floor()
-        };
+        let mut chance = Chance(7);
+        let mut chance = || (chance.share() * 8.0).floor();
         for _ in 0..2000 {
             let outline: Vec<Point> = (0..6).map(|_| Point::new(chance(), chance())).collect();
             let ends = |edge: usize| (outline[edge], outline[edge + 1]);

@@ -148,6 +148,7 @@ fn one_per_look(estimates: impl Iterator<Item = Estimate>) -> Vec<Estimate> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chance::Chance;
 
     #[test]
     fn what_comes_back_is_all_or_nothing_at_the_ends() {
@@ -161,22 +162,15 @@ mod tests {
         assert!((1..100).all(|n| fed_back(n + 1, 0.5) < fed_back(n, 0.5)));
     }
 
-    /// A number as random as it must be for a mean square.
-    fn uniform(state: &mut u64) -> f64 {
-        *state =
-            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((*state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) * 12f64.sqrt()
-    }
-
     #[test]
     fn the_mean_of_looks_that_repeat_half_of_what_they_find_errs_as_claimed() {
-        let (mut state, runs) = (9, 20_000);
+        let (mut chance, runs) = (Chance(9), 20_000);
         for looks in [2, 5, 20] {
             let mut square = 0.0;
             for _ in 0..runs {
-                let mut mean = uniform(&mut state);
+                let mut mean = chance.normal();
                 for n in (2..=looks).map(|n| n as f64) {
-                    let seen = 0.5 * mean + uniform(&mut state);
+                    let seen = 0.5 * mean + chance.normal();
                     mean += (seen - mean) / n;
                 }
                 square += mean * mean / f64::from(runs);

@@ -123,6 +123,7 @@ mod tests {
     use nalgebra::{Matrix2x4, Matrix4};
 
     use super::*;
+    use crate::chance::Chance;
     use crate::geometry::{Interval, Level, Line, tangent};
     use crate::raster::LogOdds;
     use crate::vector::{Facing, Segment, SolidInterval};
@@ -279,18 +280,10 @@ mod tests {
         let claimed = joint([0.0; 4], own.map(|c| [c, Covariance::zero()])).vertex.covariance;
         let roots = own.map(|c| nalgebra::Cholesky::new(*c.matrix()).unwrap().l());
         let exact = [[Covariance::zero(); 2]; 2];
-        let mut state = 11_u64;
-        let mut uniform = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            ((state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
-        };
-        let mut normal =
-            || (-2.0 * uniform().ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos();
+        let mut chance = Chance(11);
         let (runs, mut nees) = (4000, 0.0);
         for _ in 0..runs {
-            let errors = roots.map(|root| root * Point::new(normal(), normal()));
+            let errors = roots.map(|root| root * Point::new(chance.normal(), chance.normal()));
             let moved = [errors[0].x, errors[0].y, errors[1].x, errors[1].y];
             let error = joint(moved, exact).vertex.at - CORNER[1];
             nees += crate::geometry::mahalanobis_sq(&error, &claimed);

@@ -53,8 +53,7 @@ pub(super) struct SeenThrough {
     pub(super) looks: Vec<(Interval, f64)>,
 }
 
-/// Where scanners have looked through `pieces` (ascending, disjoint). Two things open them, sample by
-/// sample:
+/// Where scanners have looked through what was seen of a wall. Two things open it, sample by sample:
 /// * the cells on and beside the line are all free, or
 /// * the cells just behind it are free by more than one look, and by more than a share
 ///   (`config.through_share`) of those that saw the wall there, not counting the looks at another face close behind it (`backs`),
@@ -63,7 +62,6 @@ pub(super) struct SeenThrough {
 /// Single samples inside a piece are noise; ends are trimmed sample by sample.
 pub(super) fn seen_through<E: Evidence>(
     wall: &Wall,
-    pieces: &[Interval],
     backs: &[&Wall],
     grid: &E,
     config: &VectorConfig,
@@ -76,7 +74,7 @@ pub(super) fn seen_through<E: Evidence>(
     let least = (config.seen_through_min * 1e3).round() as i64;
     let mut reader = Reader::new(grid);
     let (mut through, mut went_through) = (Vec::new(), Vec::new());
-    for piece in pieces {
+    for piece in &wall.seen {
         let mut open: Option<i64> = None;
         let mut end = piece.from;
         for at in samples(piece, step) {

@@ -1,7 +1,6 @@
 //! A spatial index: what reaches into which squares of the level.
 
-use std::collections::BTreeMap;
-
+use super::buckets::Buckets;
 use crate::geometry::Point;
 
 /// A rectangle by its lower left and upper right corner.
@@ -43,12 +42,12 @@ impl Frame {
 /// Things by the squares that they reach into.
 #[derive(Debug, Clone)]
 pub(super) struct Squares<K> {
-    squares: BTreeMap<(i32, i32), Vec<(Frame, K)>>,
+    squares: Buckets<(i32, i32), (Frame, K)>,
 }
 
 impl<K> Default for Squares<K> {
     fn default() -> Self {
-        Self { squares: BTreeMap::new() }
+        Self { squares: Buckets::default() }
     }
 }
 
@@ -56,21 +55,14 @@ impl<K: Copy + PartialEq> Squares<K> {
     pub(super) fn insert(&mut self, thing: K, extent: Extent) {
         let frame = Frame::around(extent);
         for square in frame.squares() {
-            self.squares.entry(square).or_default().push((frame, thing));
+            self.squares.insert(square, (frame, thing));
         }
     }
 
     /// Removes a thing that was inserted with the same extent.
     pub(super) fn remove(&mut self, thing: K, extent: Extent) {
         for square in Frame::around(extent).squares() {
-            if let Some(things) = self.squares.get_mut(&square) {
-                if let Some(at) = things.iter().position(|(_, other)| *other == thing) {
-                    things.swap_remove(at);
-                }
-                if things.is_empty() {
-                    self.squares.remove(&square);
-                }
-            }
+            self.squares.remove(&square, |(_, other)| *other == thing);
         }
     }
 
@@ -79,33 +71,29 @@ impl<K: Copy + PartialEq> Squares<K> {
     pub(super) fn near(&self, extent: Extent) -> impl Iterator<Item = K> + '_ {
         let wanted = Frame::around(extent);
         let [first, _] = wanted.corner_squares();
-        wanted.squares().filter_map(|at| Some((at, self.squares.get(&at)?))).flat_map(
-            move |(at, things)| {
-                let is_first = move |frame: &Frame| {
-                    // In the first of the squares that both reach into.
-                    let [from, _] = frame.corner_squares();
-                    at == (from.0.max(first.0), from.1.max(first.1))
-                };
-                things
-                    .iter()
-                    .filter(move |(frame, _)| frame.overlaps(&wanted) && is_first(frame))
-                    .map(|(_, thing)| *thing)
-            },
-        )
+        wanted.squares().flat_map(move |at| {
+            let is_first = move |frame: &Frame| {
+                // In the first of the squares that both reach into.
+                let [from, _] = frame.corner_squares();
+                at == (from.0.max(first.0), from.1.max(first.1))
+            };
+            let things = self.squares.at(&at).iter();
+            things
+                .filter(move |(frame, _)| frame.overlaps(&wanted) && is_first(frame))
+                .map(|(_, thing)| *thing)
+        })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chance::Chance;
 
     #[test]
     fn near_finds_each_overlapping_extent_once() {
-        let mut state = 5_u64;
-        let mut chance = |upto: f64| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            (state >> 40) as f64 / (1_u64 << 24) as f64 * upto
-        };
+        let mut chance = Chance(5);
+        let mut chance = |upto: f64| chance.share() * upto;
         let mut extent = || {
             let low = Point::new(chance(40.0) - 20.0, chance(40.0) - 20.0);
             (low, low + Point::new(chance(12.0), chance(2.0)))

@@ -63,7 +63,7 @@ impl Wall {
         let axes = Axes::of(&line);
         let mut seen = Vec::new();
         let mut covering: Vec<Vec<Interval>> = Vec::new();
-        let mut openings = Vec::new();
+        let mut openings: Vec<Vec<Interval>> = Vec::new();
         let mut ends = Vec::new();
         let mut robots = Vec::new();
         let mut last_look = None;
@@ -78,15 +78,12 @@ impl Wall {
             if last_look != Some(id.contribution) {
                 looks += 1;
                 last_look = Some(id.contribution);
-                openings.push(Vec::new());
                 covering.push(Vec::new());
+                openings.push(Vec::new());
             }
-            if let Some(of_look) = covering.last_mut() {
-                of_look.push(span);
-            }
-            // Two pieces of one look tell of the same opening between them: it counts once.
-            if let Some(of_look) = openings.last_mut() {
-                of_look.extend(sighting.openings().map(|ends| {
+            if let (Some(covering), Some(openings)) = (covering.last_mut(), openings.last_mut()) {
+                covering.push(span);
+                openings.extend(sighting.openings().map(|ends| {
                     let [a, b] = ends.map(|p| axes.along(&p));
                     Interval::from_metres(a, b)
                 }));
@@ -98,16 +95,8 @@ impl Wall {
         robots.sort_unstable();
         robots.dedup();
         ends.sort_unstable();
-        let covers = covering
-            .iter()
-            .flat_map(|of_look| union_intervals(of_look, 0))
-            .flat_map(|span| [(span.from, 1), (span.to, -1)]);
-        let covers = counts(covers.collect());
-        let openings = openings
-            .iter()
-            .flat_map(|of_look| union_intervals(of_look, 0))
-            .flat_map(|opening| [(opening.from, 1), (opening.to, -1)]);
-        let throughs = counts(openings.collect());
+        let covers = looks_along(&covering);
+        let throughs = looks_along(&openings);
         let not_there = [
             thinly_covered(&covers, config.thin_share, config.thin_reach),
             open(&covers, &throughs, config.through_share),
@@ -145,7 +134,7 @@ impl Wall {
         (a.inf(&b), a.sup(&b))
     }
 
-    /// How many observations cover the wall at `at` millimetres.
+    /// How many looks cover the wall at `at` millimetres.
     pub(super) fn looks_at(&self, at: i64) -> i64 {
         count_at(&self.covers, at)
     }
@@ -172,7 +161,7 @@ impl Wall {
         LogOdds::from_nat(nat / piece.length().max(1) as f64)
     }
 
-    /// How many observations cover the wall abreast of `p`.
+    /// How many looks cover the wall abreast of `p`.
     pub(super) fn looks_beside(&self, p: &Point) -> i64 {
         self.looks_at((self.axes.along(p) * 1e3).round() as i64)
     }
@@ -236,6 +225,13 @@ impl Wall {
         }
         union_intervals(&shared, 0)
     }
+}
+
+/// From where on how many looks tell of something, ascending. Two pieces of one look may tell of the
+/// same: it counts once.
+fn looks_along(told: &[Vec<Interval>]) -> Vec<(i64, i64)> {
+    let once = told.iter().flat_map(|of_look| union_intervals(of_look, 0));
+    counts(once.flat_map(|stretch| [(stretch.from, 1), (stretch.to, -1)]).collect())
 }
 
 /// From where on how many, ascending, from where each begins (+1) and ends (-1).

@@ -222,7 +222,7 @@ impl Walls {
         let wall = &placed.wall;
         let others = self.near(placed).map(|(_, other)| &other.wall);
         let backs: Vec<&Wall> = others.filter(|other| wall.is_backed_by(other, config)).collect();
-        seen_through(wall, &wall.seen, &backs, grid, config)
+        seen_through(wall, &backs, grid, config)
     }
 
     /// What is published of a wall: what was seen of it, without what scanners look through and

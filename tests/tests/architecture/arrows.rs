@@ -46,12 +46,15 @@ const MODULES: &[(&str, &[ModuleRule])] = &[
     (
         "map",
         &[
+            // For unit tests only.
+            ("chance", &[]),
             ("geometry", &[]),
-            ("raster", &["geometry"]),
+            ("raster", &["chance", "geometry"]),
             // Features bear the identities that contributions give them; of the fold they know nothing.
             (
                 "vector",
                 &[
+                    "chance",
                     "geometry",
                     "raster",
                     "level::Contribution",
