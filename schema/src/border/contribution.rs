@@ -154,29 +154,16 @@ fn check_extents(
     limits: &Limits,
     wrong: &mut Violations,
 ) {
-    let root = Place::Root;
-    let length: f64 = segments.into_iter().flatten().map(|s| s.to - s.from).sum();
-    let most = limits.segments_length_max_m;
-    if length > most {
-        wrong.add(
-            &root.field("segments"),
-            "too_much_wall",
-            format_args!("{length:.0} m of wall in one look: {most} m is the most"),
-        );
-    }
-    let width = |cluster: &ObservedCluster| {
-        let reach = cluster.hull.iter().map(|p| (p - cluster.hull[0]).norm());
-        reach.fold(0.0, f64::max)
+    let mut bound = |name, sum: f64, most: f64, code, of: &str| {
+        if sum > most {
+            let told = format_args!("{sum:.0} m of {of} in one look: {most} m is the most");
+            wrong.add(&Place::Root.field(name), code, told);
+        }
     };
-    let widths: f64 = clusters.into_iter().flatten().map(width).sum();
-    let most = limits.clusters_width_max_m;
-    if widths > most {
-        wrong.add(
-            &root.field("clusters"),
-            "too_wide_clusters",
-            format_args!("clusters of {widths:.0} m together in one look: {most} m is the most"),
-        );
-    }
+    let length = segments.into_iter().flatten().map(|s| s.to - s.from).sum();
+    bound("segments", length, limits.segments_length_max_m, "too_much_wall", "wall");
+    let widths = clusters.into_iter().flatten().map(|c| cluster::width(&c.hull)).sum();
+    bound("clusters", widths, limits.clusters_width_max_m, "too_wide_clusters", "clusters");
 }
 
 fn check_identity(contribution: &v1::Contribution, target: &Target, wrong: &mut Violations) {

@@ -56,6 +56,11 @@ pub(super) fn check(
     Some(ObservedCluster { hull, centroid, covariance: covariance?.floored(&SD_FLOOR), points })
 }
 
+/// How far a hull's corners lie from its first, at most: between half its greatest width and all of it.
+pub(super) fn width(hull: &[Point]) -> f64 {
+    hull.iter().map(|p| (p - hull[0]).norm()).fold(0.0, f64::max)
+}
+
 fn check_hull(
     hull: &[[f64; 2]],
     level_from_robot: Option<&Pose<Level, Robot>>,
@@ -88,7 +93,7 @@ fn check_hull(
     if points.len() < hull.len() {
         return None;
     }
-    if points.iter().any(|p| (p - points[0]).norm() > WIDTH_MAX_M) {
+    if width(&points) > WIDTH_MAX_M {
         wrong.add(
             place,
             "cluster_too_wide",
