@@ -8,7 +8,6 @@ use mapfold_client::perception::Extractor;
 use mapfold_client::sensor::ScannerProfile;
 use mapfold_schema::v1::RangeCorrection;
 use mapfold_tests::extraction::{FANS, Set};
-use mapfold_tests::yardstick::BareLoop;
 
 /// Scans that take turns.
 const SCANS: usize = 200;
@@ -19,7 +18,7 @@ fn extraction(c: &mut Criterion) {
     for fan in FANS {
         let set = Set::plain(fan, RANGE_SD_M, SCANS);
         let scans = set.scans();
-        let bare = BareLoop::for_noise(RANGE_SD_M);
+        let bare = set.bare_loop();
         let mut lines = Vec::new();
         let mut next = (0..SCANS).cycle();
         group.bench_function(BenchmarkId::new("bare loop", fan.beams), |b| {

@@ -1,7 +1,6 @@
 //! Every log there is, played as a fleet into SQLite and into PostgreSQL, and the table of what
 //! came of it.
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use crate::carmen::Log;
@@ -51,7 +50,7 @@ pub async fn maps(
         let mut outcomes = Vec::new();
         for database in [Database::Sqlite, Database::new_postgres().await?] {
             let outcome = trial::play(database, &robots, Some(&log), &scratch).await?;
-            say(&format!("{}: {}", source.name, outcome.sentence(log.scans.len())));
+            report::say(&format!("{}: {}", source.name, outcome.sentence(log.scans.len())));
             rows.push(row(&source.name, &log, &outcome));
             outcomes.push(outcome);
         }
@@ -134,9 +133,4 @@ fn row(name: &str, log: &Log, outcome: &Outcome) -> Vec<String> {
         format!("{:.2}", 100.0 * coverage.explained_share()),
         format!("{:.2}", 100.0 * coverage.through_share()),
     ]
-}
-
-fn say(words: &str) {
-    // Progress for people; where nobody listens, the report has it all.
-    let _ = writeln!(std::io::stdout(), "{words}");
 }

@@ -7,17 +7,16 @@ mod set;
 pub mod verdict;
 
 use std::hint::black_box;
-use std::io::Write as _;
 use std::path::Path;
 
 use mapfold_client::perception::Extractor;
 
-use crate::yardstick::BareLoop;
+use crate::statistics::{mean, quantile};
 use crate::{Error, report};
-use score::{Score, mean, quantile};
+use score::Score;
 use verdict::{nees_band, within_two_sd};
 
-pub use set::{FANS, Set, bare_found, found};
+pub use set::{FANS, Set};
 
 /// Scans of a set.
 const SCANS: usize = 200;
@@ -58,14 +57,9 @@ pub fn extraction(page: &Path, data: Option<&Path>) -> Result<Vec<String>, Error
         [0.01, 0.03].into_iter().flat_map(|sd| FANS.map(|fan| Set::cluttered(fan, sd, SCANS)));
     for set in plain.chain(cluttered) {
         let scans = set.scans();
-        let bare = BareLoop::for_noise(set.profile.range_sd_m);
-        let mut lines = Vec::new();
+        let [ours, theirs] = set.scores();
+        let (bare, mut lines) = (set.bare_loop(), Vec::new());
         let mut extractor = Extractor::new(set.config());
-        let ours = set.score(|i| found(extractor.extract(&scans[i])));
-        let theirs = set.score(|i| {
-            bare.lines(&set.fan, &scans[i].ranges, &mut lines);
-            bare_found(&lines)
-        });
         let [our_time, bare_time] = times(
             |i| {
                 black_box(extractor.extract(&scans[i]));
@@ -75,26 +69,26 @@ pub fn extraction(page: &Path, data: Option<&Path>) -> Result<Vec<String>, Error
                 black_box(&lines);
             },
         );
-        say(&format!("{} mean range {:.2}", set.name, set.mean_range_m()));
+        report::say(&format!("{} mean range {:.2}", set.name, set.mean_range_m()));
         for (name, time, score) in [("bare loop", bare_time, &theirs), ("Mapfold", our_time, &ours)]
         {
             let other = if name == "Mapfold" { &theirs } else { &ours };
             let row = row(name, &set.name, time, score, other);
-            say(&row.join(" | "));
+            report::say(&row.join(" | "));
             rows.push(row);
         }
         honesty.push(honesty_row(&set.name, &ours));
-        say(&honesty_row(&set.name, &ours).join(" | "));
+        report::say(&honesty_row(&set.name, &ours).join(" | "));
         faults.extend(verdict::faults(&set.name, set.is_cluttered, &ours, &theirs));
     }
-    let text = std::fs::read_to_string(page).map_err(|e| Error::file(page, e))?;
-    let text = report::replace(&text, "extraction", &report::table(&HEADER, &rows))?;
-    let text = report::replace(&text, "lines", &report::table(&HONESTY, &honesty))?;
-    std::fs::write(page, text).map_err(|e| Error::file(page, e))?;
+    report::rewrite(page, "extraction", &report::table(&HEADER, &rows))?;
+    report::rewrite(page, "lines", &report::table(&HONESTY, &honesty))?;
     let map = data.map(|data| data.join("plans/aria/columbia.map")).filter(|map| map.is_file());
     match map {
         Some(map) => faults.extend(labelled::labelled(page, &map)?),
-        None => say("no plans/aria/columbia.map: the table of drawn lines is left as it is"),
+        None => {
+            report::say("no plans/aria/columbia.map: the table of drawn lines is left as it is");
+        }
     }
     Ok(faults)
 }
@@ -159,9 +153,4 @@ fn honesty_row(data: &str, score: &Score) -> Vec<String> {
         format!("{:.2} / {:.2}", rms(&score.corners), rms(&score.jumps)),
         score.astray.to_string(),
     ]
-}
-
-fn say(words: &str) {
-    // Progress for people; where nobody listens, the report has it all.
-    let _ = writeln!(std::io::stdout(), "{words}");
 }

@@ -16,6 +16,7 @@ use tokio::time::Instant;
 
 use self::cost::Cost;
 use self::rooms::{RESOLUTION_M, Rooms};
+use crate::statistics::quantile;
 use crate::{Error, report};
 
 /// Segments of the maps in which the cost of one more contribution is measured.
@@ -93,7 +94,7 @@ fn log(path: &Path) -> Result<(usize, [f64; 2]), Error> {
         .map(|look| look.contribution)
         .collect();
     let rate = |batch: usize| {
-        let mut times: Vec<f64> = (0..TURNS)
+        let times: Vec<f64> = (0..TURNS)
             .map(|_| {
                 let mut level = Level::new(LevelConfig::standard(RESOLUTION_M));
                 let begin = Instant::now();
@@ -103,8 +104,7 @@ fn log(path: &Path) -> Result<(usize, [f64; 2]), Error> {
                 begin.elapsed().as_secs_f64()
             })
             .collect();
-        times.sort_unstable_by(f64::total_cmp);
-        looks.len() as f64 / times[TURNS / 2]
+        looks.len() as f64 / quantile(&times, 0.5)
     };
     Ok((looks.len(), [rate(1), rate(looks.len().max(1))]))
 }

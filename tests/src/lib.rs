@@ -19,7 +19,7 @@
 //!   finds lines.
 //! * [`range`]: simulated heads, their calibration, and how well their ranges are corrected.
 //! * [`figure`]: a hallway's map as a picture.
-//! * [`evaluation`], [`speed`], [`report`]: `mapfold-evaluate`, which writes tables between markers
+//! * [`evaluation`], [`speed`], [`statistics`], [`report`]: `mapfold-evaluate`, which writes tables between markers
 //!   into a page of text.
 
 pub mod api;
@@ -44,6 +44,7 @@ pub mod robot;
 pub mod server;
 pub mod simulation;
 pub mod speed;
+pub mod statistics;
 pub mod trial;
 pub mod yardstick;
 

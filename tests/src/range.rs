@@ -86,9 +86,7 @@ pub fn evaluate(page: &Path, effort: &Effort) -> Result<Vec<String>, Error> {
         let lines = line_errors(&head, &done, effort.sweeps, false, &mut noise);
         all.lines.push(lines.map_err(fault)?);
     }
-    let text = std::fs::read_to_string(page).map_err(|e| Error::file(page, e))?;
-    let text = report::replace(&text, "range", &all.tables())?;
-    std::fs::write(page, text).map_err(|e| Error::file(page, e))?;
+    report::rewrite(page, "range", &all.tables())?;
     Ok(all.faults())
 }
 
@@ -117,17 +115,17 @@ fn honesty_at_rest(samples: &[Sample]) -> f64 {
     Errors::of(errors).bias
 }
 
-impl Measured {
-    /// Readings of half turns by incidence: from, to, readings.
-    fn bands(&self) -> impl Iterator<Item = (f64, f64, Vec<Sample>)> {
-        (0..7).map(|band| {
-            let from = BIN.1 * f64::from(band);
-            let inside = |s: &&Sample| (from..from + BIN.1).contains(&s.incidence_deg);
-            let of = self.walls.iter().filter(inside).copied().collect();
-            (from, (from + BIN.1).min(STEEPEST_DEG), of)
-        })
-    }
+/// Readings by incidence: from, to, readings.
+fn bands(samples: &[Sample]) -> impl Iterator<Item = (f64, f64, Vec<Sample>)> {
+    (0..7).map(|band| {
+        let from = BIN.1 * f64::from(band);
+        let inside = |s: &&Sample| (from..from + BIN.1).contains(&s.incidence_deg);
+        let of = samples.iter().filter(inside).copied().collect();
+        (from, (from + BIN.1).min(STEEPEST_DEG), of)
+    })
+}
 
+impl Measured {
     /// What misses the bounds.
     fn faults(&self) -> Vec<String> {
         let mut faults = Vec::new();
@@ -142,7 +140,7 @@ impl Measured {
                 faults.push(format!("head {head}: lines have a mean NEES of {nees:.2}"));
             }
         }
-        for (from, to, of) in self.bands() {
+        for (from, to, of) in bands(&self.walls) {
             let at_rest = at_rest(&of);
             if at_rest.p99 > P99_MAX_M {
                 let p99 = mm(at_rest.p99);
@@ -225,7 +223,7 @@ impl Measured {
             let stopped = vec![mm(rest.bias), mm(rest.p99), format!("{:.2}", honesty_at_rest(&of))];
             [vec![format!("{from:.0} to {to:.0}")], cells.to_vec(), vec![worst], stopped].concat()
         };
-        let rows: Vec<_> = self.bands().map(row).collect();
+        let rows: Vec<_> = bands(&self.walls).map(row).collect();
         let header = [
             "degrees",
             "raw p99 mm",
@@ -293,13 +291,7 @@ mod tests {
         let claimed = walls.iter().filter_map(|s| s.in_situ.map(|e| (e / s.claimed).powi(2)));
         let honest = Errors::of(claimed).bias;
         assert!((0.8..1.15).contains(&honest), "mean square over claimed: {honest}");
-        for band in 0..7 {
-            let from = BIN.1 * f64::from(band);
-            let of: Vec<Sample> = walls
-                .iter()
-                .filter(|s| (from..from + BIN.1).contains(&s.incidence_deg))
-                .copied()
-                .collect();
+        for (from, _, of) in bands(&walls) {
             let errors = at_rest(&of);
             assert!(of.len() > 500, "{from} degrees: {} readings", of.len());
             // Two heads and a thousand readings: the p99 is certain to some millimetres.

@@ -8,10 +8,11 @@ use std::path::Path;
 
 use mapfold_client::perception::Extractor;
 
-use super::score::{Found, quantile};
+use super::score::{Found, is_visible};
 use super::set::{Set, bare_found, found};
 use crate::plane::{Piece, Point};
 use crate::simulation::{Errors, Fan, Noise, Plan, REACH_M, Sweep};
+use crate::statistics::quantile;
 use crate::yardstick::BareLoop;
 use crate::{Error, report};
 
@@ -28,9 +29,6 @@ const RETURNS_MIN: f64 = 0.8;
 /// What lies this close to a line that was drawn is that line's, metres and radians.
 const NEAR_M: f64 = 0.10;
 const TURN_MAX: f64 = 15.0 * std::f64::consts::PI / 180.0;
-/// A line counts as visible if so many beams ended on it, over such a length, metres.
-const BEAMS_MIN: usize = 10;
-const SEEN_MIN_M: f64 = 0.5;
 /// Steps in which a found line is looked at, metres.
 const STEP_M: f64 = 0.05;
 
@@ -160,8 +158,7 @@ impl Agreement {
         for (index, line) in lines.iter().enumerate() {
             let own = sweep.hits.iter().flatten().filter(|(i, _)| *i == index);
             let own: Vec<Point> = own.map(|(_, p)| *p).collect();
-            let extent = own.iter().map(|p| p.distance(own[0])).fold(0.0, f64::max);
-            if own.len() < BEAMS_MIN || extent < SEEN_MIN_M {
+            if !is_visible(&own) {
                 continue;
             }
             self.visible += 1;

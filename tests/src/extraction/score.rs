@@ -132,6 +132,13 @@ impl Found {
         Piece { a, b }
     }
 
+    /// Whether a point that the scanner saw lies within the line's span, give or take a centimetre.
+    fn covers(&self, p: Point) -> bool {
+        let (sin, cos) = self.alpha.sin_cos();
+        let t = cos * p.y - sin * p.x;
+        t > self.span.0 - 0.01 && t < self.span.1 + 0.01
+    }
+
     fn at(&self, t: f64) -> Point {
         let (sin, cos) = self.alpha.sin_cos();
         Point::new(self.rho * cos - t * sin, self.rho * sin + t * cos)
@@ -261,7 +268,7 @@ impl Score {
 }
 
 /// Whether these points of a wall make it one that has to be found.
-fn is_visible(points: &[Point]) -> bool {
+pub(super) fn is_visible(points: &[Point]) -> bool {
     let extent = points.iter().map(|p| p.distance(points[0])).fold(0.0, f64::max);
     points.len() >= BEAMS_MIN && extent >= SEEN_MIN_M
 }
@@ -269,26 +276,4 @@ fn is_visible(points: &[Point]) -> bool {
 /// To compare how well lines fit walls: half a degree is as far off as a centimetre.
 fn cost((angle, offset): (f64, f64)) -> f64 {
     (angle.to_degrees() / 0.5).hypot(offset / 0.01)
-}
-
-impl Found {
-    /// Whether a point that the scanner saw lies within the line's span, give or take a centimetre.
-    fn covers(&self, p: Point) -> bool {
-        let (sin, cos) = self.alpha.sin_cos();
-        let t = cos * p.y - sin * p.x;
-        t > self.span.0 - 0.01 && t < self.span.1 + 0.01
-    }
-}
-
-/// The value below which this share of all lies.
-pub fn quantile(values: &[f64], share: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let at = (share * (sorted.len().max(1) - 1) as f64).round() as usize;
-    sorted.get(at).copied().unwrap_or(f64::NAN)
-}
-
-/// The mean.
-pub fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
 }

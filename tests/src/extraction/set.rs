@@ -1,13 +1,14 @@
 //! Sets of simulated scans, and what two ways of finding lines find in them.
 
-use mapfold_client::perception::{Config, Features};
+use mapfold_client::perception::{Config, Extractor, Features};
 use mapfold_client::sensor::{MountedAt, Scan, ScanGeometry, ScannerProfile};
 use mapfold_map::geometry::Pose;
 use mapfold_map::vector::EndKind;
 
-use super::score::{End, Found, Score, mean};
+use super::score::{End, Found, Score};
 use crate::simulation::{Errors, Fan, Noise, Plan, REACH_M, Sweep};
-use crate::yardstick::BareLine;
+use crate::statistics::mean;
+use crate::yardstick::{BareLine, BareLoop};
 
 /// Scans in one office before the next is built.
 const SCANS_IN_OFFICE: usize = 20;
@@ -114,8 +115,26 @@ impl Set {
         mean(&returns)
     }
 
+    /// The bare loop for this scanner.
+    pub fn bare_loop(&self) -> BareLoop {
+        BareLoop::for_noise(self.profile.range_sd_m)
+    }
+
+    /// What extraction and what the bare loop find.
+    pub fn scores(&self) -> [Score; 2] {
+        let scans = self.scans();
+        let mut extractor = Extractor::new(self.config());
+        let (bare, mut lines) = (self.bare_loop(), Vec::new());
+        let ours = self.score(|i| found(extractor.extract(&scans[i])));
+        let theirs = self.score(|i| {
+            bare.lines(&self.fan, &scans[i].ranges, &mut lines);
+            bare_found(&lines)
+        });
+        [ours, theirs]
+    }
+
     /// Holds what was found in each scan against its office.
-    pub fn score(&self, mut found_in: impl FnMut(usize) -> Vec<Found>) -> Score {
+    fn score(&self, mut found_in: impl FnMut(usize) -> Vec<Found>) -> Score {
         let mut score = Score::default();
         for (i, (plan, sweep)) in self.sweeps.iter().enumerate() {
             score.add(&self.plans[*plan], sweep, &found_in(i));
@@ -125,7 +144,7 @@ impl Set {
 }
 
 /// A scan's segments.
-pub fn found(features: &Features) -> Vec<Found> {
+pub(super) fn found(features: &Features) -> Vec<Found> {
     let of = |segment: &mapfold_map::vector::ObservedSegment| {
         let covariance = segment.line.covariance.rows();
         Found {
@@ -144,7 +163,7 @@ pub fn found(features: &Features) -> Vec<Found> {
 }
 
 /// A scan's bare lines.
-pub fn bare_found(lines: &[BareLine]) -> Vec<Found> {
+pub(super) fn bare_found(lines: &[BareLine]) -> Vec<Found> {
     let of = |line: &BareLine| Found {
         rho: line.rho,
         alpha: line.alpha,

@@ -1,6 +1,7 @@
 //! Whether extraction finds as much as the bare loop, errs no more, and claims no more than it knows.
 
-use super::score::{Score, mean, quantile};
+use super::score::Score;
+use crate::statistics::{mean, quantile};
 
 /// The 95th percentile of a thousand errors is known to some five percent, twice that is no
 /// difference.

@@ -6,6 +6,7 @@ use mapfold_map::level::Level;
 use tokio::time::Instant;
 
 use super::rooms::Rooms;
+use crate::statistics::quantile;
 
 /// Rooms around a measured one that have got evidence too: further away nothing depends on it.
 const REACH: u64 = 2;
@@ -39,13 +40,8 @@ pub struct Spread {
 }
 
 impl Spread {
-    fn of(mut times: Vec<f64>) -> Self {
-        times.sort_unstable_by(f64::total_cmp);
-        let at = |share: f64| {
-            let last = times.len().saturating_sub(1);
-            times.get((share * last as f64).round() as usize).copied().unwrap_or(f64::NAN)
-        };
-        Self { median: at(0.5), p95: at(0.95) }
+    fn of(times: &[f64]) -> Self {
+        Self { median: quantile(times, 0.5), p95: quantile(times, 0.95) }
     }
 }
 
@@ -124,9 +120,9 @@ pub fn measure(segments: &[u64], count: usize, turn: usize) -> Vec<Cost> {
             segments: place.level.map().segments.len(),
             contributions: place.level.in_force().len(),
             bytes: place.bytes,
-            first: Spread::of(place.samples.first),
-            next: Spread::of(place.samples.next),
-            out: Spread::of(place.samples.out),
+            first: Spread::of(&place.samples.first),
+            next: Spread::of(&place.samples.next),
+            out: Spread::of(&place.samples.out),
         })
         .collect()
 }
