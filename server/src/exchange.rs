@@ -4,8 +4,10 @@
 //! Equal maps give equal bytes: nothing here writes the time of day, an address or a version. GeoJSON,
 //! which mirrors write too, is in `mapfold_schema::geojson`.
 //!
-//! * [`nav2`]: the raster as `map.yaml` and `map.pgm`.
+//! * [`layers`]: which layers a raster has, and where they are found.
+//! * [`nav2`]: the raster as `map.yaml` and an image, out and in.
 //! * [`png_tiles`]: the raster as a picture pyramid.
 
+pub mod layers;
 pub mod nav2;
 pub mod png_tiles;

@@ -148,10 +148,11 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * The whole map as a file: `geojson`, or `nav2` (a zip of `map.yaml` and `map.pgm`).
+         * The whole map as a file: `geojson`, or `nav2` (a zip of `map.yaml` and `map.pgm` or `map.png`).
          * @description Equal maps give equal bytes. GeoJSON has a `LineString` for each solid part of a segment (with
          *     the feature id `<segment id>#<n>`), a `Polygon` for each cluster and the one or the other for each
-         *     chain, in metres of the level.
+         *     chain, in metres of the level. A nav2 map can be had in every mode of `map_server`, of each layer,
+         *     and of a rectangle; its yaw is 0, and its numbers are written in full.
          */
         get: operations["export"];
         put?: never;
@@ -2012,7 +2013,16 @@ export interface operations {
     };
     export: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description `nav2`: `trinary` (the default), `scale` or `raw`. */
+                mode?: "trinary" | "scale" | "raw";
+                /** @description `nav2`: `pgm` or `png`; `png` for mode scale and `pgm` for the others if absent. */
+                image?: "pgm" | "png";
+                /** @description `nav2`: `all` (the sum, the default), `scanner`, `sonar` or `prior`. */
+                layer?: "all" | "scanner" | "sonar" | "prior";
+                /** @description `nav2`: only the cells that touch this rectangle, `min_x,min_y,max_x,max_y` in metres. */
+                bbox?: string;
+            };
             header?: never;
             path: {
                 site: string;
@@ -2043,7 +2053,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description `map_empty`, `map_too_large`: there is no image of this map */
+            /** @description `map_empty`, `map_too_large`: there is no image of this map, or not of all of it */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -2401,8 +2411,8 @@ export interface operations {
     read_picture: {
         parameters: {
             query?: {
-                /** @description `all` (the sum, the default), `scanner` or `sonar`. */
-                layer?: "all" | "scanner" | "sonar";
+                /** @description `all` (the sum, the default), `scanner`, `sonar` or `prior`. */
+                layer?: "all" | "scanner" | "sonar" | "prior";
             };
             header?: never;
             path: {

@@ -65,6 +65,18 @@ pub struct Bounds {
     pub max_y_m: f64,
 }
 
+impl Bounds {
+    /// Reads `min_x,min_y,max_x,max_y` in metres, as queries name a rectangle; `None` for anything
+    /// but four finite numbers, the minima not above the maxima.
+    pub fn parse(text: &str) -> Option<Self> {
+        let numbers: Vec<f64> = text.split(',').map(str::parse).collect::<Result<_, _>>().ok()?;
+        let [min_x_m, min_y_m, max_x_m, max_y_m] = numbers[..] else { return None };
+        let ordered = min_x_m <= max_x_m && min_y_m <= max_y_m;
+        let finite = numbers.iter().all(|n| n.is_finite());
+        (ordered && finite).then_some(Self { min_x_m, min_y_m, max_x_m, max_y_m })
+    }
+}
+
 /// How much a level holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 pub struct Counts {
@@ -82,4 +94,18 @@ pub struct Counts {
     pub chains: i64,
     /// Published tiles of all layers.
     pub tiles: i64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rectangle_is_four_finite_numbers_in_order() {
+        let bounds = Bounds { min_x_m: -1.0, min_y_m: 2.5, max_x_m: 3.0, max_y_m: 4.0 };
+        assert_eq!(Bounds::parse("-1,2.5,3,4"), Some(bounds));
+        for bad in ["", "1,2,3", "1,2,3,4,5", "3,0,1,1", "0,0,NaN,1", "0,0,inf,1", "a,b,c,d"] {
+            assert_eq!(Bounds::parse(bad), None, "{bad:?}");
+        }
+    }
 }

@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use mapfold_schema::v1::Scope;
+use mapfold_schema::v1::{Bounds, Scope};
 use serde::Serialize;
 
 /// Keeps the log of what robots saw, folds it into one map per level, and shares the map.
@@ -133,13 +133,70 @@ pub(super) struct ExportCommand {
     /// The file to write; for nav2 the YAML, with the image beside it: `floor.pgm` for `floor.yaml`
     #[arg(long, value_name = "FILE")]
     pub(super) out: PathBuf,
+    #[command(flatten)]
+    pub(super) nav2: Nav2Options,
+}
+
+/// Of nav2 only: what is drawn, and how.
+#[derive(Debug, Args)]
+pub(super) struct Nav2Options {
+    /// Of nav2: how greys stand for occupancy [default: trinary]
+    #[arg(long, value_enum)]
+    pub(super) mode: Option<ModeName>,
+    /// Of nav2: how the image is written [default: png for mode scale, pgm for the others]
+    #[arg(long, value_enum)]
+    pub(super) image: Option<ImageName>,
+    /// Of nav2: which evidence is drawn [default: all]
+    #[arg(long, value_enum)]
+    pub(super) layer: Option<LayerName>,
+    /// Of nav2: only the cells that touch this rectangle, in metres
+    #[arg(
+        long,
+        value_name = "MIN_X,MIN_Y,MAX_X,MAX_Y",
+        value_parser = bbox,
+        allow_hyphen_values = true
+    )]
+    pub(super) bbox: Option<Bounds>,
+}
+
+fn bbox(text: &str) -> Result<Bounds, String> {
+    let wanted = "four numbers in metres, the minima not above the maxima";
+    Bounds::parse(text).ok_or_else(|| wanted.to_owned())
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(super) enum ModeName {
+    /// Occupied, free or unknown
+    Trinary,
+    /// As many greys as there are; transparent where nothing is known
+    Scale,
+    /// The grey is the occupancy in per cent; 255 where nothing is known
+    Raw,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(super) enum ImageName {
+    Pgm,
+    Png,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(super) enum LayerName {
+    /// The sum of all layers
+    All,
+    /// What scanners saw
+    Scanner,
+    /// What sonars saw
+    Sonar,
+    /// What was imported
+    Prior,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(super) enum ExportFormat {
     /// Segments, clusters and chains in metres
     Geojson,
-    /// A YAML and a PGM, as `map_server` reads them
+    /// A YAML and an image, as `map_server` reads them
     Nav2,
 }
 

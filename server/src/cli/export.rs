@@ -7,13 +7,15 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
+use mapfold_map::raster::SensorClass;
 use mapfold_schema::geojson;
 
-use super::args::{ExportCommand, ExportFormat};
+use super::args::{ExportCommand, ExportFormat, ImageName, LayerName, ModeName, Nav2Options};
 use super::{CommandError, say};
 use crate::clock::SystemClock;
 use crate::config::Config;
-use crate::exchange::nav2::Nav2Map;
+use crate::exchange::layers::{Layer, LayerId};
+use crate::exchange::nav2::{Content, ImageFormat, Mode, Nav2Error, Nav2Map, Style};
 use crate::level::{LevelOptions, Levels, Snapshot};
 use crate::running::open_existing_store;
 
@@ -41,21 +43,28 @@ pub(super) async fn run(
 }
 
 fn write(snapshot: &Snapshot, command: &ExportCommand) -> Result<ExitCode, CommandError> {
-    let map = snapshot.map();
     match command.format {
+        ExportFormat::Geojson if !command.nav2.is_empty() => {
+            let words = "geojson takes none of --mode, --image, --layer and --bbox";
+            return Err(CommandError::Refused(words.to_owned()));
+        }
         ExportFormat::Geojson => {
-            to_file(&command.out, |file| geojson::write_map(&map, file))?;
+            to_file(&command.out, |file| geojson::write_map(&snapshot.map(), file))?;
         }
         ExportFormat::Nav2 => {
-            let nav2 = Nav2Map::new(&map, snapshot.resolution_m())
-                .map_err(|error| CommandError::Refused(error.to_string()))?;
-            let image = image_beside(&command.out);
+            let refused = |error: Nav2Error| CommandError::Refused(error.to_string());
+            let (content, style) = (command.nav2.content(), command.nav2.style());
+            let style = style.map_err(refused)?;
+            let nav2 = Nav2Map::new(snapshot, snapshot.resolution_m(), content, style);
+            let nav2 = nav2.map_err(refused)?;
+            let image = image_beside(&command.out, nav2.format());
             let name = image.file_name().and_then(|name| name.to_str()).ok_or_else(|| {
                 let path = command.out.display();
                 CommandError::Refused(format!("{path} has no name that YAML can hold"))
             })?;
-            to_file(&image, |file| nav2.write_pgm(file))?;
-            to_file(&command.out, |file| file.write_all(nav2.yaml(name).as_bytes()))?;
+            let yaml = nav2.description(name).to_string();
+            to_file(&image, |file| nav2.write_image(file))?;
+            to_file(&command.out, |file| file.write_all(yaml.as_bytes()))?;
         }
     }
     let (path, revision) = (command.out.display(), snapshot.folded_revision());
@@ -63,14 +72,46 @@ fn write(snapshot: &Snapshot, command: &ExportCommand) -> Result<ExitCode, Comma
     Ok(ExitCode::SUCCESS)
 }
 
+impl Nav2Options {
+    fn is_empty(&self) -> bool {
+        matches!(self, Self { mode: None, image: None, layer: None, bbox: None })
+    }
+
+    fn content(&self) -> Content {
+        let layer = match self.layer.unwrap_or(LayerName::All) {
+            LayerName::All => Layer::All,
+            LayerName::Scanner => Layer::Only(LayerId::Sensor(SensorClass::Scanner)),
+            LayerName::Sonar => Layer::Only(LayerId::Sensor(SensorClass::Sonar)),
+            LayerName::Prior => Layer::Only(LayerId::Prior),
+        };
+        Content { layer, bbox: self.bbox }
+    }
+
+    fn style(&self) -> Result<Style, Nav2Error> {
+        let mode = match self.mode.unwrap_or(ModeName::Trinary) {
+            ModeName::Trinary => Mode::Trinary,
+            ModeName::Scale => Mode::Scale,
+            ModeName::Raw => Mode::Raw,
+        };
+        let format = self.image.map(|image| match image {
+            ImageName::Pgm => ImageFormat::Pgm,
+            ImageName::Png => ImageFormat::Png,
+        });
+        Style::new(mode, format)
+    }
+}
+
 /// Where the image of a nav2 map goes whose description is `yaml`: `floor.pgm` beside `floor.yaml`.
-fn image_beside(yaml: &Path) -> PathBuf {
+fn image_beside(yaml: &Path, format: ImageFormat) -> PathBuf {
     match yaml.extension() {
-        Some(extension) if extension == "yaml" || extension == "yml" => yaml.with_extension("pgm"),
+        Some(extension) if extension == "yaml" || extension == "yml" => {
+            yaml.with_extension(format.extension())
+        }
         // Any other end is part of the name; put after it, the image never takes its place.
         _ => {
             let mut image = yaml.as_os_str().to_owned();
-            image.push(".pgm");
+            image.push(".");
+            image.push(format.extension());
             image.into()
         }
     }
@@ -107,7 +148,8 @@ mod tests {
             ("floor.2", "floor.2.pgm"),
             ("map.pgm", "map.pgm.pgm"),
         ] {
-            assert_eq!(image_beside(Path::new(yaml)), Path::new(image), "{yaml}");
+            let beside = image_beside(Path::new(yaml), ImageFormat::Pgm);
+            assert_eq!(beside, Path::new(image), "{yaml}");
         }
     }
 }

@@ -17,8 +17,9 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
-use mapfold_map::level::LevelMap;
-use mapfold_map::raster::{SensorClass, TILE_SIDE, Tile, TileIndex, TileKey};
+use mapfold_map::raster::{TILE_SIDE, Tile, TileIndex};
+
+use super::layers::{Layer, LayerId, Raster};
 
 pub use cache::{Picture, PictureCache};
 pub use shades::{Shades, Shading};
@@ -30,21 +31,6 @@ pub const ZOOM_NATIVE: u8 = 6;
 /// The highest zoom level.
 pub const ZOOM_MAX: u8 = 8;
 
-/// Which evidence a picture shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Layer {
-    /// The sum of all classes.
-    All,
-    /// One class alone.
-    Only(SensorClass),
-}
-
-impl Layer {
-    fn shows(self, class: SensorClass) -> bool {
-        self == Self::All || self == Self::Only(class)
-    }
-}
-
 /// A place in the pyramid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Address {
@@ -53,28 +39,8 @@ pub struct Address {
     col: i32,
 }
 
-/// Where tiles are: a map, or what a level publishes.
-pub trait Tiles {
-    /// All tiles from `first` to `last`, ascending.
-    fn between(
-        &self,
-        first: TileKey,
-        last: TileKey,
-    ) -> Box<dyn Iterator<Item = (&TileKey, &Arc<Tile>)> + '_>;
-}
-
-impl Tiles for LevelMap {
-    fn between(
-        &self,
-        first: TileKey,
-        last: TileKey,
-    ) -> Box<dyn Iterator<Item = (&TileKey, &Arc<Tile>)> + '_> {
-        Box::new(self.tiles.range(first..=last))
-    }
-}
-
-/// The tiles of one place: its layers that are shown, in the canonical order of classes.
-pub type Layers<'a> = Vec<(SensorClass, &'a Arc<Tile>)>;
+/// The tiles of one place: its layers that are shown, in the canonical order.
+pub type Layers<'a> = Vec<(LayerId, &'a Arc<Tile>)>;
 
 impl Address {
     /// The picture at zoom level `z`; `None` beyond [`ZOOM_MAX`].
@@ -98,16 +64,16 @@ impl Address {
         Some((span(i64::from(self.col) * along)?, span((-i64::from(self.row) - 1) * along)?))
     }
 
-    /// What `map` holds of `layer` in this picture. Costs a search per column of map tiles,
+    /// What a raster holds of `layer` in this picture. Costs a search per column of map tiles,
     /// however large the map.
-    pub fn select(self, map: &impl Tiles, layer: Layer) -> BTreeMap<TileIndex, Layers<'_>> {
+    pub fn select(self, raster: &impl Raster, layer: Layer) -> BTreeMap<TileIndex, Layers<'_>> {
         let mut found: BTreeMap<TileIndex, Layers> = BTreeMap::new();
         let Some((xs, ys)) = self.tiles() else { return found };
-        for class in SensorClass::ALL.into_iter().filter(|class| layer.shows(*class)) {
+        for part in layer.parts() {
             for x in xs.clone() {
-                let key = |y: i32| TileKey { class, tile: TileIndex { x, y } };
-                for (key, tile) in map.between(key(*ys.start()), key(*ys.end())) {
-                    found.entry(key.tile).or_default().push((class, tile));
+                let tile = |y: i32| TileIndex { x, y };
+                for (at, tile) in raster.between(part, tile(*ys.start()), tile(*ys.end())) {
+                    found.entry(at).or_default().push((part, tile));
                 }
             }
         }

@@ -8,54 +8,130 @@ use axum::http::header::CONTENT_DISPOSITION;
 use axum::response::Response;
 use mapfold_schema::geojson;
 use mapfold_schema::route;
+use mapfold_schema::v1::Bounds;
+use serde::Deserialize;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
 use super::access::{LevelFor, Read};
 use super::answer::Reader;
 use super::problem::ApiError;
+use super::query::{QueryOf, bbox};
 use super::state::App;
-use crate::exchange::nav2;
+use super::tiles::LayerName;
+use crate::exchange::nav2::{self, Content, ImageFormat, Mode, Nav2Map, Style};
 use crate::level::Snapshot;
 
 /// Media type of a zip.
 pub(super) const ZIP: &str = "application/zip";
 
-type Writer = fn(&Snapshot) -> Result<Vec<u8>, ApiError>;
+/// How greys of a nav2 image stand for occupancy.
+#[derive(Debug, Clone, Copy, Deserialize, utoipa::ToSchema)]
+#[serde(rename_all = "snake_case")]
+enum ModeName {
+    /// Occupied, free or unknown.
+    Trinary,
+    /// As many greys as there are; transparent where nothing is known.
+    Scale,
+    /// The grey is the occupancy in per cent; 255 where nothing is known.
+    Raw,
+}
 
-/// The whole map as a file: `geojson`, or `nav2` (a zip of `map.yaml` and `map.pgm`).
+/// How a nav2 image is written.
+#[derive(Debug, Clone, Copy, Deserialize, utoipa::ToSchema)]
+#[serde(rename_all = "snake_case")]
+enum ImageName {
+    Pgm,
+    Png,
+}
+
+/// What of a map is written, and how; of `nav2` only.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(super) struct ExportQuery {
+    /// `nav2`: `trinary` (the default), `scale` or `raw`.
+    #[param(inline)]
+    mode: Option<ModeName>,
+    /// `nav2`: `pgm` or `png`; `png` for mode scale and `pgm` for the others if absent.
+    #[param(inline)]
+    image: Option<ImageName>,
+    /// `nav2`: `all` (the sum, the default), `scanner`, `sonar` or `prior`.
+    #[param(inline)]
+    layer: Option<LayerName>,
+    /// `nav2`: only the cells that touch this rectangle, `min_x,min_y,max_x,max_y` in metres.
+    #[serde(default, deserialize_with = "bbox")]
+    #[param(value_type = Option<String>)]
+    bbox: Option<Bounds>,
+}
+
+impl ExportQuery {
+    fn is_empty(&self) -> bool {
+        matches!(self, Self { mode: None, image: None, layer: None, bbox: None })
+    }
+
+    fn content(&self) -> Content {
+        Content { layer: self.layer.unwrap_or_default().into(), bbox: self.bbox }
+    }
+
+    fn style(&self) -> Result<Style, ApiError> {
+        let mode = self.mode.map_or(Mode::Trinary, |mode| match mode {
+            ModeName::Trinary => Mode::Trinary,
+            ModeName::Scale => Mode::Scale,
+            ModeName::Raw => Mode::Raw,
+        });
+        let format = self.image.map(|image| match image {
+            ImageName::Pgm => ImageFormat::Pgm,
+            ImageName::Png => ImageFormat::Png,
+        });
+        Style::new(mode, format).map_err(ApiError::Nav2)
+    }
+}
+
+/// The whole map as a file: `geojson`, or `nav2` (a zip of `map.yaml` and `map.pgm` or `map.png`).
 ///
 /// Equal maps give equal bytes. GeoJSON has a `LineString` for each solid part of a segment (with
 /// the feature id `<segment id>#<n>`), a `Polygon` for each cluster and the one or the other for each
-/// chain, in metres of the level.
+/// chain, in metres of the level. A nav2 map can be had in every mode of `map_server`, of each layer,
+/// and of a rectangle; its yaw is 0, and its numbers are written in full.
 #[utoipa::path(
     get, path = route::EXPORTS, operation_id = "export", tag = "map",
     params(
         ("site" = String, Path), ("level" = String, Path),
         ("format" = String, Path, description = "`geojson` or `nav2`"),
+        ExportQuery,
     ),
     responses(
         (status = 200, description = "The file", content((Object = "application/geo+json"), (Vec<u8> = "application/zip"))),
         (status = 404, description = "`format_not_found`"),
-        (status = 409, description = "`map_empty`, `map_too_large`: there is no image of this map"),
+        (status = 409, description = "`map_empty`, `map_too_large`: there is no image of this map, or not of all of it"),
     )
 )]
 pub(super) async fn read(
     State(app): State<App>,
     level: LevelFor<Read>,
     Path((site, name, format)): Path<(String, String, String)>,
+    QueryOf(query): QueryOf<ExportQuery>,
     reader: Reader,
 ) -> Result<Response, ApiError> {
-    let (media_type, extension, write): (_, _, Writer) = match format.as_str() {
-        "geojson" => (geojson::MEDIA_TYPE, "geojson", write_geojson),
-        "nav2" => (ZIP, "zip", write_nav2),
+    let (media_type, extension, nav2) = match format.as_str() {
+        "geojson" if query.is_empty() => (geojson::MEDIA_TYPE, "geojson", None),
+        "geojson" => {
+            let words = "geojson is of the whole vector map: it takes none of these.";
+            return Err(ApiError::Query(words.to_owned()));
+        }
+        "nav2" => (ZIP, "zip", Some((query.content(), query.style()?))),
         _ => return Err(ApiError::not_found("format", format)),
     };
     let media_type = reader.choose(&[media_type])?;
     let _turn = app.exports.acquire().await.ok().ok_or(ApiError::Closing)?;
     let snapshot = level.level.snapshot();
     let (frame, revision) = (level.level.frame(), snapshot.folded_revision());
-    let mut response = reader.file(frame, revision, media_type, move || write(&snapshot)).await?;
+    let write = move || match nav2 {
+        None => write_geojson(&snapshot),
+        Some((content, style)) => write_nav2(&snapshot, content, style),
+    };
+    let mut response = reader.file(frame, revision, media_type, write).await?;
     let name = format!("attachment; filename=\"{site}-{name}.{extension}\"");
     if let Ok(name) = HeaderValue::from_str(&name) {
         response.headers_mut().insert(CONTENT_DISPOSITION, name);
@@ -69,17 +145,19 @@ fn write_geojson(snapshot: &Snapshot) -> Result<Vec<u8>, ApiError> {
     Ok(bytes)
 }
 
-fn write_nav2(snapshot: &Snapshot) -> Result<Vec<u8>, ApiError> {
-    let map = snapshot.map();
-    let nav2 = nav2::Nav2Map::new(&map, snapshot.resolution_m()).map_err(ApiError::Nav2)?;
+fn write_nav2(snapshot: &Snapshot, content: Content, style: Style) -> Result<Vec<u8>, ApiError> {
+    let nav2 = Nav2Map::new(snapshot, snapshot.resolution_m(), content, style);
+    let nav2 = nav2.map_err(ApiError::Nav2)?;
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     // No times: the same map gives the same bytes.
     let options = SimpleFileOptions::default().last_modified_time(zip::DateTime::default());
     let zipped = |error: zip::result::ZipError| ApiError::Internal(error.to_string());
+    let image = format!("map.{}", nav2.format().extension());
     zip.start_file(nav2::YAML_NAME, options).map_err(zipped)?;
-    zip.write_all(nav2.yaml(nav2::IMAGE_NAME).as_bytes()).map_err(|error| failed(&error))?;
-    zip.start_file(nav2::IMAGE_NAME, options).map_err(zipped)?;
-    nav2.write_pgm(&mut zip).map_err(|error| failed(&error))?;
+    let yaml = nav2.description(&image).to_string();
+    zip.write_all(yaml.as_bytes()).map_err(|error| failed(&error))?;
+    zip.start_file(image, options).map_err(zipped)?;
+    nav2.write_image(&mut zip).map_err(|error| failed(&error))?;
     Ok(zip.finish().map_err(zipped)?.into_inner())
 }
 

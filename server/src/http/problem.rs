@@ -183,10 +183,13 @@ impl ApiError {
             Self::Level(LevelError::Store(error)) | Self::Store(error) => of_store(error),
             Self::Nav2(error) => {
                 let code = match error {
-                    Nav2Error::Empty => "map_empty",
+                    Nav2Error::Empty | Nav2Error::EmptyBox => "map_empty",
                     Nav2Error::TooLarge { .. } => "map_too_large",
+                    Nav2Error::NoTransparency => {
+                        return of(400, "query_invalid", sentence(&error.to_string()));
+                    }
                 };
-                of(409, code, error.to_string())
+                of(409, code, sentence(&error.to_string()))
             }
             Self::Internal(_) => of(500, "internal", "The server is at fault; its log says more."),
         }
@@ -209,6 +212,13 @@ fn of(status: u16, code: &str, detail: impl Into<String>) -> Problem {
     let mut title = code.replace('_', " ");
     title[..1].make_ascii_uppercase();
     Problem::new(status, code, &title, detail)
+}
+
+/// Words as a sentence.
+fn sentence(words: &str) -> String {
+    let mut chars = words.chars();
+    let first = chars.next().map(|c| c.to_ascii_uppercase());
+    first.into_iter().chain(chars).chain(['.']).collect()
 }
 
 fn invalid(code: &str, detail: &str, errors: &[Violation]) -> Problem {

@@ -49,31 +49,9 @@ pub(super) fn before(cursor: Option<&str>) -> Result<Option<i64>, ApiError> {
 /// `min_x,min_y,max_x,max_y` in metres.
 pub(super) fn bbox<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Bounds>, D::Error> {
     let text = String::deserialize(from)?;
-    parse_bbox(&text).map(Some).ok_or_else(|| {
+    Bounds::parse(&text).map(Some).ok_or_else(|| {
         serde::de::Error::custom(
             "bbox is four numbers, min_x,min_y,max_x,max_y in metres, the minima not above the maxima",
         )
     })
-}
-
-fn parse_bbox(text: &str) -> Option<Bounds> {
-    let numbers: Vec<f64> = text.split(',').map(str::parse).collect::<Result<_, _>>().ok()?;
-    let [min_x_m, min_y_m, max_x_m, max_y_m] = numbers[..] else { return None };
-    let ordered = min_x_m <= max_x_m && min_y_m <= max_y_m;
-    let finite = numbers.iter().all(|n| n.is_finite());
-    (ordered && finite).then_some(Bounds { min_x_m, min_y_m, max_x_m, max_y_m })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_bbox_is_four_finite_numbers_in_order() {
-        let bounds = Bounds { min_x_m: -1.0, min_y_m: 2.5, max_x_m: 3.0, max_y_m: 4.0 };
-        assert_eq!(parse_bbox("-1,2.5,3,4"), Some(bounds));
-        for bad in ["", "1,2,3", "1,2,3,4,5", "3,0,1,1", "0,0,NaN,1", "0,0,inf,1", "a,b,c,d"] {
-            assert_eq!(parse_bbox(bad), None, "{bad:?}");
-        }
-    }
 }

@@ -1,10 +1,8 @@
 //! `L/tiles`: the picture pyramid.
 
-use std::sync::Arc;
-
 use axum::extract::{Path, State};
 use axum::response::Response;
-use mapfold_map::raster::{Tile, TileKey};
+use mapfold_map::raster::{TileIndex, TileKey};
 use mapfold_schema::route;
 use mapfold_schema::v1::SensorClass;
 use serde::Deserialize;
@@ -14,22 +12,21 @@ use super::answer::{Reader, Tag, blocking};
 use super::problem::ApiError;
 use super::query::QueryOf;
 use super::state::App;
-use crate::exchange::png_tiles::{self, Address, Layer, Tiles};
+use crate::exchange::layers::{Layer, LayerId, LayerTiles, Raster};
+use crate::exchange::png_tiles::{self, Address};
 use crate::level::Snapshot;
 
 const PNG: &str = "image/png";
 
-impl Tiles for Snapshot {
-    fn between(
-        &self,
-        first: TileKey,
-        last: TileKey,
-    ) -> Box<dyn Iterator<Item = (&TileKey, &Arc<Tile>)> + '_> {
-        Box::new(self.tiles_between(first, last))
+impl Raster for Snapshot {
+    fn between(&self, layer: LayerId, first: TileIndex, last: TileIndex) -> LayerTiles<'_> {
+        let LayerId::Sensor(class) = layer else { return Box::new(std::iter::empty()) };
+        let key = |tile| TileKey { class, tile };
+        Box::new(self.tiles_between(key(first), key(last)).map(|(key, tile)| (key.tile, tile)))
     }
 }
 
-/// Which evidence a picture shows.
+/// Which evidence is asked for.
 #[derive(Debug, Clone, Copy, Default, Deserialize, utoipa::ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum LayerName {
@@ -40,6 +37,8 @@ pub(super) enum LayerName {
     Scanner,
     /// Sonars alone.
     Sonar,
+    /// What was imported, alone.
+    Prior,
 }
 
 /// Which evidence a picture shows.
@@ -47,7 +46,7 @@ pub(super) enum LayerName {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(super) struct PictureQuery {
-    /// `all` (the sum, the default), `scanner` or `sonar`.
+    /// `all` (the sum, the default), `scanner`, `sonar` or `prior`.
     #[serde(default)]
     #[param(inline)]
     layer: LayerName,
@@ -57,8 +56,9 @@ impl From<LayerName> for Layer {
     fn from(name: LayerName) -> Self {
         match name {
             LayerName::All => Self::All,
-            LayerName::Scanner => Self::Only(SensorClass::Scanner.into()),
-            LayerName::Sonar => Self::Only(SensorClass::Sonar.into()),
+            LayerName::Scanner => Self::Only(LayerId::Sensor(SensorClass::Scanner.into())),
+            LayerName::Sonar => Self::Only(LayerId::Sensor(SensorClass::Sonar.into())),
+            LayerName::Prior => Self::Only(LayerId::Prior),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::{Cursor, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
 
@@ -12,7 +12,8 @@ use mapfold_map::raster::{LogOdds, SensorClass, TILE_CELLS, Tile, TileIndex, Til
 use mapfold_map::vector::{Cluster, EndKind, Facing, Segment, SolidInterval};
 use mapfold_schema::geojson;
 use mapfold_schema::route;
-use mapfold_server::exchange::nav2::Nav2Map;
+use mapfold_server::exchange::nav2::{Content, Description, Image, Nav2Map, Style, load};
+use reqwest::header::IF_NONE_MATCH;
 
 use crate::server::Server;
 use crate::world::Level;
@@ -70,14 +71,14 @@ fn map() -> LevelMap {
 #[test]
 fn exports_of_a_known_map_are_the_committed_files() {
     let map = map();
-    let nav2 = Nav2Map::new(&map, 0.05).unwrap();
+    let nav2 = Nav2Map::new(&map, 0.05, Content::default(), Style::default()).unwrap();
     let (mut features, mut image) = (Vec::new(), Vec::new());
     geojson::write_map(&map, &mut features).unwrap();
-    nav2.write_pgm(&mut image).unwrap();
+    nav2.write_image(&mut image).unwrap();
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/http/golden");
     for (name, bytes) in [
         ("map.geojson", features),
-        ("map.yaml", nav2.yaml("map.pgm").into_bytes()),
+        ("map.yaml", nav2.description("map.pgm").to_string().into_bytes()),
         ("map.pgm", image),
     ] {
         if std::env::var_os("UPDATE").is_some() {
@@ -141,17 +142,78 @@ async fn the_same_looks_in_any_order_give_the_same_bytes_over_http_and_on_the_co
 }
 
 /// Runs `mapfold-server export` on the data of a server that has stopped.
-fn exported(folder: &Path, format: &str, name: &str) -> std::path::PathBuf {
+fn exported(folder: &Path, format: &str, name: &str) -> PathBuf {
+    exported_with(folder, format, name, &[])
+}
+
+fn exported_with(folder: &Path, format: &str, name: &str, more: &[&str]) -> PathBuf {
     let file = folder.join(name);
     let status = Command::new(env!("CARGO_BIN_EXE_mapfold-server"))
         .args(["export", format, "--site", "plant", "--level", "floor", "--data-dir"])
         .arg(folder.join("data"))
         .arg("--out")
         .arg(&file)
+        .args(more)
         .status()
         .unwrap();
     assert!(status.success());
     file
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_nav2_map_can_be_had_in_every_mode_and_format_of_each_layer_and_of_a_rectangle() {
+    let server = Server::start().await;
+    let floor = Level::create(&server.admin()).await;
+    floor.contribute("r1", 1).await;
+    let path =
+        |query: &str| format!("{}{query}", floor.path(route::EXPORTS).replace("{format}", "nav2"));
+    let mut zips = BTreeMap::new();
+    for (query, image, lines) in [
+        ("?mode=trinary&image=pgm&layer=all", "map.pgm", "mode: trinary\n"),
+        ("?image=png", "map.png", "mode: trinary\n"),
+        ("?mode=scale", "map.png", "occupied_thresh: 1\nfree_thresh: 0\n"),
+        ("?mode=raw", "map.pgm", "mode: raw\n"),
+        ("?layer=scanner", "map.pgm", "negate: 0\n"),
+        ("?bbox=0,0,3.2,3.2", "map.pgm", "origin: [0.0, 0.0, 0.0]\n"),
+    ] {
+        let answer = server.admin().get(&path(query)).await.expect(200);
+        let files = unzipped(&answer.body);
+        let yaml = String::from_utf8(files["map.yaml"].clone()).unwrap();
+        assert!(yaml.contains(lines) && yaml.starts_with(&format!("image: {image}\n")), "{yaml}");
+        let (description, warnings) = Description::read(yaml.as_bytes()).unwrap();
+        let loaded = load(&description, &Image::read(&files[image]).unwrap());
+        assert_eq!((warnings, loaded.warnings.len()), (vec![], 0), "{query}");
+        // Another question is never answered with the other's bytes.
+        let tag = answer.header("etag").to_owned();
+        let again = server.admin().get_with(&path(query), IF_NONE_MATCH, &tag).await;
+        again.expect(304);
+        assert!(zips.insert(tag, query).is_none(), "{query}");
+    }
+
+    for (query, status, code) in [
+        ("?layer=prior", 409, "map_empty"),
+        ("?layer=sonar", 409, "map_empty"),
+        ("?bbox=900,900,901,901", 409, "map_empty"),
+        ("?bbox=-9e9,-9e9,9e9,9e9", 409, "map_too_large"),
+        ("?mode=scale&image=pgm", 400, "query_invalid"),
+        ("?mode=fancy", 400, "query_invalid"),
+        ("?colour=red", 400, "query_invalid"),
+    ] {
+        assert_eq!(server.admin().get(&path(query)).await.code(status), code, "{query}");
+    }
+    let geojson = floor.path(route::EXPORTS).replace("{format}", "geojson");
+    let refused = server.admin().get(&format!("{geojson}?mode=raw")).await;
+    assert_eq!(refused.code(400), "query_invalid");
+    let too_large = server.admin().get(&path("?bbox=-9e9,-9e9,9e9,9e9")).await.problem(409);
+    assert!(too_large.detail.contains("`bbox`"));
+
+    let by_http = server.admin().get(&path("?mode=scale&bbox=-1,-1,2,2")).await.expect(200);
+    let folder = server.shutdown().await;
+    let more = ["--mode", "scale", "--bbox", "-1,-1,2,2"];
+    let yaml = exported_with(folder.path(), "nav2", "map.yaml", &more);
+    let zipped = unzipped(&by_http.body);
+    assert!(std::fs::read(&yaml).unwrap() == zipped["map.yaml"]);
+    assert!(std::fs::read(yaml.with_file_name("map.png")).unwrap() == zipped["map.png"]);
 }
 
 #[tokio::test(flavor = "multi_thread")]

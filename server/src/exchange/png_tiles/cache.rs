@@ -7,11 +7,11 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
 
-use mapfold_map::raster::{SensorClass, Tile, TileIndex};
+use mapfold_map::raster::{Tile, TileIndex};
 use sha2::{Digest, Sha256};
 use uuid::Uuid;
 
-use super::{Address, Layer, Layers, Shades, Shading, Tiles};
+use super::{Address, Layer, LayerId, Layers, Raster, Shades, Shading};
 
 /// Most tiles whose shades are kept, about 5 kB each.
 const SHADES_MAX: usize = 8192;
@@ -52,7 +52,7 @@ struct Kept {
 #[derive(Debug)]
 struct Shaded {
     serial: u64,
-    tiles: Vec<(SensorClass, Weak<Tile>)>,
+    tiles: Vec<(LayerId, Weak<Tile>)>,
     shades: Shades,
 }
 
@@ -80,7 +80,7 @@ impl PictureCache {
     pub fn picture(
         &self,
         frame: Uuid,
-        map: &impl Tiles,
+        map: &impl Raster,
         address: Address,
         layer: Layer,
     ) -> Result<Arc<Picture>, png::EncodingError> {
@@ -116,7 +116,7 @@ impl PictureCache {
         if let Some(shaded) = self.kept().shades.get(&key).filter(|s| s.is_of(layers)) {
             return shaded;
         }
-        let plain: Vec<(SensorClass, &Tile)> =
+        let plain: Vec<(LayerId, &Tile)> =
             layers.iter().map(|(class, tile)| (*class, tile.as_ref())).collect();
         let shades = self.shading.shade(&plain);
         let tiles = layers.iter().map(|(class, tile)| (*class, Arc::downgrade(tile))).collect();

@@ -2,7 +2,7 @@
 
 use mapfold_map::raster::{LogOdds, SensorClass, TILE_CELLS, TILE_SIDE, Tile};
 
-use super::PICTURE_SIDE;
+use super::{LayerId, PICTURE_SIDE};
 
 /// Steps from certainly free to certainly occupied.
 const STEPS: u8 = 16;
@@ -40,7 +40,7 @@ impl Shading {
     }
 
     /// The shades of the layers of one place.
-    pub fn shade(&self, layers: &[(SensorClass, &Tile)]) -> Shades {
+    pub fn shade(&self, layers: &[(LayerId, &Tile)]) -> Shades {
         let mut levels = vec![UNKNOWN; LEVELS_LENGTH];
         for (cell, shade) in levels[..TILE_CELLS].iter_mut().enumerate() {
             let (mut sum, mut known, mut scanned) = (0, false, false);
@@ -48,7 +48,7 @@ impl Shading {
                 let value = tile.cells()[cell];
                 sum += i64::from(value);
                 known |= value != 0;
-                scanned |= value != 0 && *class == SensorClass::Scanner;
+                scanned |= value != 0 && *class == LayerId::Sensor(SensorClass::Scanner);
             }
             if known {
                 *shade = 1 + self.step(sum) + if scanned { 0 } else { STEPS };

@@ -1,6 +1,7 @@
 //! Pictures of small maps, pixel by pixel.
 
-use mapfold_map::raster::{Cell, TILE_CELLS};
+use mapfold_map::level::LevelMap;
+use mapfold_map::raster::{Cell, SensorClass, TILE_CELLS, TileKey};
 use uuid::Uuid;
 
 use super::*;
@@ -89,9 +90,9 @@ fn sonar_has_its_own_hue_only_where_no_scanner_speaks() {
     let all = drawn(&map, 6, 0, 0, Layer::All);
     let is_orange = |p: [u8; 4]| p[0] > p[2];
     assert!(!is_orange(all[0]) && is_orange(all[1]));
-    let sonar = drawn(&map, 6, 0, 0, Layer::Only(SONAR));
+    let sonar = drawn(&map, 6, 0, 0, Layer::Only(LayerId::Sensor(SONAR)));
     assert!(is_orange(sonar[0]) && is_orange(sonar[1]));
-    let scanner = drawn(&map, 6, 0, 0, Layer::Only(SCANNER));
+    let scanner = drawn(&map, 6, 0, 0, Layer::Only(LayerId::Sensor(SCANNER)));
     assert_eq!(seen(&scanner), [(0, 0)]);
 }
 

@@ -1,0 +1,62 @@
+//! The layers of a level's raster, and where their tiles are: a map, or what a level publishes.
+
+use std::sync::Arc;
+
+use mapfold_map::level::LevelMap;
+use mapfold_map::raster::{SensorClass, Tile, TileIndex, TileKey};
+
+/// One layer of a level's raster.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LayerId {
+    /// What sensors of one class saw.
+    Sensor(SensorClass),
+    /// What was known before any robot came.
+    Prior,
+}
+
+impl LayerId {
+    /// All layers, in their canonical order.
+    pub const ALL: [Self; 3] =
+        [Self::Sensor(SensorClass::Scanner), Self::Sensor(SensorClass::Sonar), Self::Prior];
+}
+
+/// Which evidence is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Layer {
+    /// The sum of all layers.
+    All,
+    /// One layer alone.
+    Only(LayerId),
+}
+
+impl Layer {
+    /// The layers that are summed, in their canonical order.
+    pub fn parts(self) -> impl Iterator<Item = LayerId> {
+        LayerId::ALL.into_iter().filter(move |id| self == Self::All || self == Self::Only(*id))
+    }
+}
+
+/// Tiles of a layer with their places, ascending.
+pub type LayerTiles<'a> = Box<dyn Iterator<Item = (TileIndex, &'a Arc<Tile>)> + 'a>;
+
+/// Where tiles are.
+pub trait Raster {
+    /// The tiles of a layer from `first` to `last`, in the order of [`TileIndex`].
+    fn between(&self, layer: LayerId, first: TileIndex, last: TileIndex) -> LayerTiles<'_>;
+
+    /// All tiles of a layer.
+    fn tiles_of(&self, layer: LayerId) -> LayerTiles<'_> {
+        let first = TileIndex { x: i32::MIN, y: i32::MIN };
+        self.between(layer, first, TileIndex { x: i32::MAX, y: i32::MAX })
+    }
+}
+
+/// What robots saw; a map knows of no prior.
+impl Raster for LevelMap {
+    fn between(&self, layer: LayerId, first: TileIndex, last: TileIndex) -> LayerTiles<'_> {
+        let LayerId::Sensor(class) = layer else { return Box::new(std::iter::empty()) };
+        let key = |tile| TileKey { class, tile };
+        let range = self.tiles.range(key(first)..=key(last));
+        Box::new(range.map(|(key, tile)| (key.tile, tile)))
+    }
+}
