@@ -3,11 +3,14 @@
 mod blocks;
 mod evidence;
 mod log_odds;
+mod slices;
 mod tile;
 
 pub(crate) use blocks::{Blocks, Touched};
 pub use evidence::{EvidencePatch, EvidenceRun, RunError, TilePatch};
 pub use log_odds::LogOdds;
+pub(crate) use slices::Stack;
+pub use slices::{Slice, SliceConfig, SliceKey};
 pub use tile::{Cell, TILE_CELLS, TILE_SIDE, Tile, TileIndex, TileKey};
 
 /// The kind of sensor that evidence comes from; each has layers of its own.

@@ -148,6 +148,7 @@ impl LevelHandle {
             resolution_m: row.resolution_m,
             tile_cells: TILE_SIDE as u32,
             elevation_m: row.elevation_m,
+            evidence_slice_s: row.slice_s,
             revision: self.shared.head.load(Ordering::Acquire).max(snapshot.revision()),
             folded_revision: snapshot.folded_revision(),
             bounds: snapshot.bounds(),

@@ -44,8 +44,13 @@ impl Level {
     pub async fn create(api: Api, site: &str, level: &str) -> Result<Self, Error> {
         let new_site = NewSite { site: site.to_owned(), name: None };
         api.post_json(route::SITES, &new_site).await?.expect(201)?;
-        let new_level =
-            NewLevel { level: level.to_owned(), name: None, resolution_m: None, elevation_m: None };
+        let new_level = NewLevel {
+            level: level.to_owned(),
+            name: None,
+            resolution_m: None,
+            elevation_m: None,
+            evidence_slice_s: None,
+        };
         api.post_json(&route::of_site(route::LEVELS, site), &new_level).await?.expect(201)?;
         Ok(Self::new(api, site, level))
     }

@@ -736,6 +736,11 @@ export interface components {
              */
             elevation_m: number;
             /**
+             * Format: int32
+             * @description Length of the stretches of time for which evidence is summed up, seconds.
+             */
+            evidence_slice_s: number;
+            /**
              * Format: int64
              * @description Revision that the published map has reached.
              */
@@ -804,6 +809,13 @@ export interface components {
              * @description Height of the floor; 0 if absent.
              */
             elevation_m?: number | null;
+            /**
+             * Format: int32
+             * @description How fast the raster yields to change: evidence is summed up for stretches of so many seconds
+             *     since 1970, and what the earlier ones come to counts for no more than a few looks against a
+             *     later one. 600 to 2592000; a day (86400) if absent. Never changed.
+             */
+            evidence_slice_s?: number | null;
             /** @description Slug: lower-case letters, digits and hyphens. */
             level: string;
             /** @description Name for people; the slug if absent. */

@@ -158,6 +158,7 @@ export function level(fields: Partial<LevelDescription> = {}): LevelDescription 
     resolution_m: 0.05,
     tile_cells: 64,
     elevation_m: 0,
+    evidence_slice_s: 86400,
     revision: 7,
     folded_revision: 7,
     bounds: null,

@@ -74,6 +74,7 @@ impl Enrolment<'_> {
                     name: None,
                     resolution_m: *resolution_m,
                     elevation_m: None,
+                    evidence_slice_s: None,
                 };
                 made(api.create_level(&address.site, &level).await)
                     .map_err(name("cannot make level"))?;

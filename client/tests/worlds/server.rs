@@ -132,6 +132,7 @@ async fn create_level(
         resolution_m: new.resolution_m.unwrap_or(0.05),
         tile_cells: 64,
         elevation_m: 0.0,
+        evidence_slice_s: 86_400,
         revision: 0,
         folded_revision: 0,
         bounds: None,

@@ -5,16 +5,17 @@
 
 use std::collections::BTreeMap;
 
-use super::{Contribution, ContributionId};
-use crate::raster::{Tile, TileKey};
+use super::{Contribution, ContributionId, LevelConfig};
+use crate::raster::{SliceConfig, SliceKey, Tile, TileKey};
 
 /// Contributions, each once, with their evidence summed up.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Batch {
+    slices: SliceConfig,
     /// Without their evidence.
     pub(super) contributions: BTreeMap<ContributionId, Contribution>,
-    /// The sum of their evidence; a tile that they touch is in it, also with nothing but zeros.
-    pub(super) evidence: BTreeMap<TileKey, Tile>,
+    /// The sum of their evidence; what they touch is in it, also with nothing but zeros.
+    pub(super) evidence: BTreeMap<SliceKey, Tile>,
 }
 
 /// A contribution of a batch is in force and should not be, or the other way round.
@@ -22,15 +23,21 @@ pub struct Batch {
 pub struct Misplaced(pub ContributionId);
 
 impl Batch {
+    /// None yet, for a level of this configuration.
+    pub fn new(config: &LevelConfig) -> Self {
+        Self { slices: config.slices, contributions: BTreeMap::new(), evidence: BTreeMap::new() }
+    }
+
     /// Adds a contribution; one that it holds already changes nothing.
     pub fn add(&mut self, mut contribution: Contribution) {
         if self.contributions.contains_key(&contribution.id) {
             return;
         }
+        let slice = self.slices.slice(contribution.observed_at_us);
         for patch in std::mem::take(&mut contribution.evidence) {
             for (tile, cells) in &patch.tiles {
                 let key = TileKey { class: patch.class, tile: *tile };
-                self.evidence.entry(key).or_default().add(cells);
+                self.evidence.entry(SliceKey { key, slice }).or_default().add(cells);
             }
         }
         self.contributions.insert(contribution.id, contribution);

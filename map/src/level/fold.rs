@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::{Batch, Contribution, ContributionId, FeatureId, LevelMap, Misplaced};
-use crate::raster::{Blocks, SensorClass, Tile, TileKey, TilePatch, Touched};
+use crate::raster::{
+    Blocks, SensorClass, SliceConfig, SliceKey, Stack, Tile, TileKey, TilePatch, Touched,
+};
 use crate::vector::{ChainId, Chains, Evidence, Things, VectorConfig, Walls, Work};
 
 /// What a level's fold depends on besides its contributions.
@@ -12,6 +14,8 @@ use crate::vector::{ChainId, Chains, Evidence, Things, VectorConfig, Walls, Work
 pub struct LevelConfig {
     /// Edge of a cell, metres.
     pub resolution: f64,
+    /// How evidence yields to newer evidence.
+    pub slices: SliceConfig,
     /// The vector fold's thresholds.
     pub vector: VectorConfig,
 }
@@ -19,7 +23,7 @@ pub struct LevelConfig {
 impl LevelConfig {
     /// Standard thresholds on a grid of `resolution` metres a cell.
     pub fn standard(resolution: f64) -> Self {
-        Self { resolution, vector: VectorConfig::STANDARD }
+        Self { resolution, slices: SliceConfig::STANDARD, vector: VectorConfig::STANDARD }
     }
 }
 
@@ -34,6 +38,8 @@ pub struct Changes {
     pub chains: BTreeSet<ChainId>,
     /// Tiles.
     pub tiles: BTreeSet<TileKey>,
+    /// The sums that tiles are read from; not published, see [`Level::sums`].
+    pub slices: BTreeSet<SliceKey>,
 }
 
 /// A level's map together with what the fold must remember to change it.
@@ -42,9 +48,24 @@ pub struct Level {
     config: LevelConfig,
     map: LevelMap,
     in_force: BTreeSet<ContributionId>,
+    stacks: BTreeMap<TileKey, Stack>,
     walls: Walls,
     things: Things,
     chains: Chains,
+}
+
+/// What evidence has touched.
+#[derive(Debug, Default)]
+struct Evident {
+    slices: BTreeSet<SliceKey>,
+    tiles: BTreeMap<TileKey, Blocks>,
+}
+
+impl Evident {
+    fn add(&mut self, at: SliceKey, blocks: Blocks) {
+        self.slices.insert(at);
+        self.tiles.entry(at.key).or_default().add(blocks);
+    }
 }
 
 /// The grid as the vector fold reads it.
@@ -70,29 +91,34 @@ impl Level {
             config,
             map: LevelMap::default(),
             in_force: BTreeSet::new(),
+            stacks: BTreeMap::new(),
             walls: Walls::default(),
             things: Things::default(),
             chains: Chains::default(),
         }
     }
 
-    /// A level from its stored tiles (the sums at some revision) and the contributions then in
-    /// force. Their evidence is in the tiles already and is not looked at, so it may be left out
-    /// of them. The same bits as folding them.
+    /// A level from its stored sums (at some revision) and the contributions then in force. Their
+    /// evidence is in the sums already and is not looked at, so it may be left out of them. The same
+    /// bits as folding them.
     pub fn restore<'a>(
         config: LevelConfig,
-        tiles: impl IntoIterator<Item = (TileKey, Tile)>,
+        sums: impl IntoIterator<Item = (SliceKey, Tile)>,
         contributions: impl IntoIterator<Item = &'a Contribution>,
     ) -> Self {
         let mut level = Self::new(config);
-        level.map.tiles = tiles
-            .into_iter()
-            .filter(|(_, tile)| !tile.is_empty())
-            .map(|(key, tile)| (key, Arc::new(tile)))
+        for (SliceKey { key, slice }, tile) in sums {
+            let stack = level.stacks.entry(key).or_default();
+            stack.change(slice, config.slices, |sums| *sums = tile);
+        }
+        level.stacks.retain(|_, stack| !stack.is_empty());
+        let readings = level.stacks.iter();
+        level.map.tiles = readings
+            .filter_map(|(key, stack)| Some((*key, stack.reading(config.slices)?)))
             .collect();
         let mut inserted: Vec<&Contribution> = contributions.into_iter().collect();
         inserted.retain(|c| level.in_force.insert(c.id));
-        level.fold_features(&inserted, &[], &BTreeMap::new());
+        level.fold_features(&inserted, &[], Evident::default());
         level
     }
 
@@ -104,6 +130,12 @@ impl Level {
     /// What is published.
     pub fn map(&self) -> &LevelMap {
         &self.map
+    }
+
+    /// The summed evidence of one layer's tile in one slice, if there is any: what must be kept, with
+    /// the contributions, to [`Self::restore`] the level.
+    pub fn sums(&self, at: &SliceKey) -> Option<&Arc<Tile>> {
+        self.stacks.get(&at.key)?.sums(at.slice)
     }
 
     /// The contributions in force.
@@ -123,8 +155,8 @@ impl Level {
     ) -> Changes {
         let mut inserted: Vec<&Contribution> = contributions.into_iter().collect();
         inserted.retain(|c| self.in_force.insert(c.id));
-        let tiles = self.fold_evidence(&inserted, Tile::add);
-        self.fold_features(&inserted, &[], &tiles)
+        let evident = self.fold_evidence(&inserted, Tile::add);
+        self.fold_features(&inserted, &[], evident)
     }
 
     /// Takes contributions out again: the map is then bit for bit what it would have been without
@@ -136,8 +168,8 @@ impl Level {
     ) -> Changes {
         let mut removed: Vec<&Contribution> = contributions.into_iter().collect();
         removed.retain(|c| self.in_force.remove(&c.id));
-        let tiles = self.fold_evidence(&removed, Tile::subtract);
-        self.fold_features(&[], &removed, &tiles)
+        let evident = self.fold_evidence(&removed, Tile::subtract);
+        self.fold_features(&[], &removed, evident)
     }
 
     /// Folds a batch in, at once: the same bits as [`Self::fold`] with its contributions.
@@ -149,9 +181,9 @@ impl Level {
             return Err(Misplaced(*id));
         }
         self.in_force.extend(batch.contributions.keys());
-        let tiles = self.fold_sums(batch, Tile::add_tile);
+        let evident = self.fold_sums(batch, Tile::add_tile);
         let inserted: Vec<&Contribution> = batch.contributions.values().collect();
-        Ok(self.fold_features(&inserted, &[], &tiles))
+        Ok(self.fold_features(&inserted, &[], evident))
     }
 
     /// Takes a batch out, at once: the same bits as [`Self::unfold`] with its contributions.
@@ -165,24 +197,21 @@ impl Level {
         for id in batch.contributions.keys() {
             self.in_force.remove(id);
         }
-        let tiles = self.fold_sums(batch, Tile::subtract_tile);
+        let evident = self.fold_sums(batch, Tile::subtract_tile);
         let removed: Vec<&Contribution> = batch.contributions.values().collect();
-        Ok(self.fold_features(&[], &removed, &tiles))
+        Ok(self.fold_features(&[], &removed, evident))
     }
 
     /// Applies the summed evidence of a batch by `change`; returns what is touched.
-    fn fold_sums(
-        &mut self,
-        batch: &Batch,
-        change: fn(&mut Tile, &Tile),
-    ) -> BTreeMap<TileKey, Blocks> {
-        for (key, sums) in &batch.evidence {
-            change(Arc::make_mut(self.map.tiles.entry(*key).or_default()), sums);
+    fn fold_sums(&mut self, batch: &Batch, change: fn(&mut Tile, &Tile)) -> Evident {
+        let mut evident = Evident::default();
+        for (at, sums) in &batch.evidence {
+            let stack = self.stacks.entry(at.key).or_default();
+            stack.change(at.slice, self.config.slices, |tile| change(tile, sums));
+            evident.add(*at, Blocks::of_tile(sums));
         }
-        let blocks = |(key, sums): (&TileKey, &Tile)| (*key, Blocks::of_tile(sums));
-        let touched = batch.evidence.iter().map(blocks).collect();
-        self.drop_empty(&touched);
-        touched
+        self.read_again(&evident);
+        evident
     }
 
     /// Applies the evidence of `contributions` by `change`; returns what is touched.
@@ -190,24 +219,31 @@ impl Level {
         &mut self,
         contributions: &[&Contribution],
         change: fn(&mut Tile, &TilePatch),
-    ) -> BTreeMap<TileKey, Blocks> {
-        let mut touched: BTreeMap<TileKey, Blocks> = BTreeMap::new();
-        for patch in contributions.iter().flat_map(|c| &c.evidence) {
-            for (tile, cells) in &patch.tiles {
-                let key = TileKey { class: patch.class, tile: *tile };
-                let sum = self.map.tiles.entry(key).or_default();
-                change(Arc::make_mut(sum), cells);
-                touched.entry(key).or_default().add(Blocks::of_patch(cells));
+    ) -> Evident {
+        let mut evident = Evident::default();
+        for contribution in contributions {
+            let slice = self.config.slices.slice(contribution.observed_at_us);
+            for patch in &contribution.evidence {
+                for (tile, cells) in &patch.tiles {
+                    let key = TileKey { class: patch.class, tile: *tile };
+                    let stack = self.stacks.entry(key).or_default();
+                    stack.change(slice, self.config.slices, |sums| change(sums, cells));
+                    evident.add(SliceKey { key, slice }, Blocks::of_patch(cells));
+                }
             }
         }
-        self.drop_empty(&touched);
-        touched
+        self.read_again(&evident);
+        evident
     }
 
-    /// A tile without evidence is the same as none.
-    fn drop_empty(&mut self, touched: &BTreeMap<TileKey, Blocks>) {
-        for key in touched.keys() {
-            if self.map.tiles.get(key).is_some_and(|tile| tile.is_empty()) {
+    /// Publishes what the touched tiles read as. A tile without evidence is the same as none.
+    fn read_again(&mut self, evident: &Evident) {
+        for key in evident.tiles.keys() {
+            let stack = self.stacks.get(key);
+            if let Some(reading) = stack.and_then(|stack| stack.reading(self.config.slices)) {
+                self.map.tiles.insert(*key, reading);
+            } else {
+                self.stacks.remove(key);
                 self.map.tiles.remove(key);
             }
         }
@@ -217,11 +253,15 @@ impl Level {
         &mut self,
         inserted: &[&Contribution],
         removed: &[&Contribution],
-        touched: &BTreeMap<TileKey, Blocks>,
+        evident: Evident,
     ) -> Changes {
-        let mut changes =
-            Changes { tiles: touched.keys().copied().collect(), ..Changes::default() };
-        let touched: Touched = touched
+        let mut changes = Changes {
+            tiles: evident.tiles.keys().copied().collect(),
+            slices: evident.slices,
+            ..Changes::default()
+        };
+        let touched: Touched = evident
+            .tiles
             .iter()
             .filter(|(key, _)| key.class == SensorClass::Scanner)
             .map(|(key, blocks)| (key.tile, *blocks))

@@ -57,7 +57,7 @@ proptest! {
     fn a_batch_is_the_same_as_its_contributions(seed: u64, out in 1_u64..39) {
         let all = looks(seed, 40, NOISE);
         let mut chance = Chance(seed ^ 1);
-        let (mut batch, mut kept) = (Batch::default(), Vec::new());
+        let (mut batch, mut kept) = (Batch::new(&LevelConfig::standard(0.05)), Vec::new());
         for look in chance.shuffled(all.clone()) {
             if chance.bits() % 40 < out {
                 batch.add(look.clone());
@@ -88,13 +88,14 @@ proptest! {
     #[test]
     fn restoring_and_going_on_is_the_same_as_folding(seed: u64, stored in 0_usize..40) {
         let looks = looks(seed, 40, NOISE);
-        let before = folded(&looks[..stored]);
-        let tiles = before.map().tiles.iter().map(|(key, tile)| (*key, tile.as_ref().clone()));
+        let mut before = Level::new(LevelConfig::standard(0.05));
+        let slices = before.fold(&looks[..stored]).slices;
+        let sums = slices.iter().map(|at| (*at, before.sums(at).unwrap().as_ref().clone()));
         let bare: Vec<Contribution> = looks[..stored]
             .iter()
             .map(|c| Contribution { evidence: Vec::new(), ..c.clone() })
             .collect();
-        let mut restored = Level::restore(LevelConfig::standard(0.05), tiles, &bare);
+        let mut restored = Level::restore(LevelConfig::standard(0.05), sums, &bare);
         prop_assert_eq!(restored.map(), before.map());
         restored.fold(&looks[stored..]);
         let at_once = folded(&looks);
@@ -133,6 +134,7 @@ proptest! {
         let changed: Vec<_> = patch.tiles.keys().chain(&patch.removed_tiles).copied().collect();
         for key in &changed {
             prop_assert!(changes.tiles.contains(key));
+            prop_assert!(changes.slices.iter().any(|at| at.key == *key));
         }
     }
 }

@@ -181,7 +181,8 @@ pub(crate) fn looks(seed: u64, count: u64, noise: Noise) -> Vec<Contribution> {
             Contribution {
                 id: id(seed, number),
                 robot: Arc::from(["ada", "bob", "cy"][(number % 3) as usize]),
-                observed_at_us: 1_000_000 * number as i64,
+                // Some ten looks a day.
+                observed_at_us: 8_000_000_000 * number as i64,
                 level_from_robot: UncertainPose {
                     pose: claimed,
                     covariance: Covariance::from_variances([

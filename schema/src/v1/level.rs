@@ -19,6 +19,11 @@ pub struct NewLevel {
     /// Height of the floor; 0 if absent.
     #[serde(default)]
     pub elevation_m: Option<f64>,
+    /// How fast the raster yields to change: evidence is summed up for stretches of so many seconds
+    /// since 1970, and what the earlier ones come to counts for no more than a few looks against a
+    /// later one. 600 to 2592000; a day (86400) if absent. Never changed.
+    #[serde(default)]
+    pub evidence_slice_s: Option<u32>,
 }
 
 /// A level as it is.
@@ -38,6 +43,8 @@ pub struct LevelDescription {
     pub tile_cells: u32,
     /// Height of the floor.
     pub elevation_m: f64,
+    /// Length of the stretches of time for which evidence is summed up, seconds.
+    pub evidence_slice_s: u32,
     /// Newest revision of the log.
     pub revision: i64,
     /// Revision that the published map has reached.

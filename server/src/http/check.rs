@@ -20,6 +20,9 @@ const NAMED_MAX: usize = 1000;
 const RESOLUTION_M: std::ops::RangeInclusive<f64> = 0.005..=1.0;
 /// Height of a floor over some datum.
 const ELEVATION_MAX_M: f64 = 10_000.0;
+/// Length of a slice of evidence, seconds: ten minutes, shorter than which few looks come together, to
+/// thirty days.
+const SLICE_S: std::ops::RangeInclusive<u32> = 600..=2_592_000;
 /// What a robot's token may allow: never what operators do.
 const ROBOT_SCOPES: [Scope; 2] = [Scope::MapRead, Scope::MapContribute];
 
@@ -88,6 +91,10 @@ pub(super) fn new_level(new: &NewLevel) -> Result<(), ApiError> {
     let fine = new.elevation_m.is_none_or(|e| e.abs() <= ELEVATION_MAX_M);
     let detail = format!("a floor lies at most {ELEVATION_MAX_M} m above or below");
     findings.expect(fine, "/elevation_m", "out_of_range", detail);
+    let (low, high) = (SLICE_S.start(), SLICE_S.end());
+    let fine = new.evidence_slice_s.is_none_or(|s| SLICE_S.contains(&s));
+    let detail = format!("evidence is summed up for stretches of {low} to {high} seconds");
+    findings.expect(fine, "/evidence_slice_s", "out_of_range", detail);
     findings.done()
 }
 
@@ -182,8 +189,9 @@ mod tests {
             name: Some("\u{1b}[2J".to_owned()),
             resolution_m: Some(f64::NAN),
             elevation_m: Some(1e9),
+            evidence_slice_s: Some(0),
         };
-        let expected = ["/level", "/name", "/resolution_m", "/elevation_m"];
+        let expected = ["/level", "/name", "/resolution_m", "/elevation_m", "/evidence_slice_s"];
         assert_eq!(pointers(new_level(&level)), expected);
         assert!(robot_scopes(Some(vec![Scope::MapRead, Scope::Admin])).is_err());
         assert!(robot_scopes(Some(Vec::new())).is_err());

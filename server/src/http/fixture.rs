@@ -34,6 +34,7 @@ impl Fixture {
             frame: Uuid::from_u128(1),
             resolution_m: 0.05,
             elevation_m: 0.0,
+            slice_s: 86_400,
             created_at_us: 0,
         };
         store.create_level("plant", &row).await.unwrap();

@@ -2,6 +2,7 @@
 
 use axum::extract::State;
 use axum::response::Response;
+use mapfold_map::raster::SliceConfig;
 use mapfold_schema::route;
 use mapfold_schema::v1::{LevelDescription, NewLevel};
 
@@ -55,6 +56,7 @@ pub(super) async fn create(
         frame: app.parts.chance.uuid(),
         resolution_m: new.resolution_m.unwrap_or(RESOLUTION_M),
         elevation_m: new.elevation_m.unwrap_or(0.0),
+        slice_s: new.evidence_slice_s.unwrap_or(SliceConfig::STANDARD.length_s),
         created_at_us: app.now_us(),
     };
     app.store().create_level(&site.site, &row).await?;

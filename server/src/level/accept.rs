@@ -41,8 +41,15 @@ impl Accepted {
             pose_covariance: wire.pose.covariance,
             payload: payload::split(wire)?,
         };
-        Ok(Self { row, checked: Arc::new(checked) })
+        Ok(Self { row, checked: Arc::new(as_received(checked, received_at_us)) })
     }
+}
+
+/// A contribution as it is folded: nothing was seen after it came, whatever the robot's clock says.
+/// Evidence from the future would stand above all that others see until then.
+pub(super) fn as_received(mut contribution: Contribution, received_at_us: i64) -> Contribution {
+    contribution.observed_at_us = contribution.observed_at_us.min(received_at_us);
+    contribution
 }
 
 fn count(items: usize) -> u32 {

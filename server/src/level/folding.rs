@@ -8,7 +8,7 @@
 use std::collections::BTreeSet;
 
 use mapfold_map::level::{Batch, Changes, Level, LevelConfig, Misplaced};
-use mapfold_map::raster::{Tile, TileKey};
+use mapfold_map::raster::{SliceKey, Tile};
 
 use super::history::{ChangeCounts, MapHistory};
 use super::recall::{Entry, Logged};
@@ -49,31 +49,27 @@ pub(crate) struct Folding {
 
 impl Folding {
     /// An empty level.
-    pub(crate) fn empty(resolution_m: f64) -> Self {
+    pub(crate) fn empty(config: &LevelConfig) -> Self {
         Self {
-            level: Level::new(LevelConfig::standard(resolution_m)),
+            level: Level::new(*config),
             history: MapHistory::default(),
             revision: 0,
             contributions: 0,
         }
     }
 
-    /// A level at `revision`, from the tiles stored then and the contributions up to then
+    /// A level at `revision`, from the evidence stored then and the contributions up to then
     /// (without their evidence), but for those whose revisions are `out`. Its history is still to
     /// be filled in.
     pub(super) fn restored(
-        resolution_m: f64,
+        config: &LevelConfig,
         revision: i64,
-        tiles: impl IntoIterator<Item = (TileKey, Tile)>,
+        sums: impl IntoIterator<Item = (SliceKey, Tile)>,
         log: &[Logged],
         out: &BTreeSet<i64>,
     ) -> Self {
         let in_force = log.iter().filter(|logged| !logged.held && !out.contains(&logged.revision));
-        let level = Level::restore(
-            LevelConfig::standard(resolution_m),
-            tiles,
-            in_force.map(|logged| &*logged.contribution),
-        );
+        let level = Level::restore(*config, sums, in_force.map(|logged| &*logged.contribution));
         let contributions = log.len() as i64;
         Self { level, history: MapHistory::default(), revision, contributions }
     }
@@ -100,7 +96,7 @@ impl Folding {
                 .map_err(|misplaced| Stray::Misplaced { revision, misplaced })?,
         };
         self.revision = revision;
-        Ok(self.history.record(&changes, self.level.map(), revision))
+        Ok(self.history.record(&changes, &self.level, revision))
     }
 
     /// Does what an act would do, without history, asks `look` about the outcome, and does the
@@ -126,9 +122,8 @@ impl Folding {
             ActKind::Restore => ActKind::Revert,
         };
         let back = move_batch(&mut self.level, opposite, moved).map_err(|Misplaced(_)| Spoilt)?;
-        let as_before = [&changes, &back]
-            .into_iter()
-            .all(|changes| self.history.agrees(changes, self.level.map()));
+        let as_before =
+            [&changes, &back].into_iter().all(|changes| self.history.agrees(changes, &self.level));
         if as_before { Ok(Ok(seen)) } else { Err(Spoilt) }
     }
 

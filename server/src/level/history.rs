@@ -7,8 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Bound;
 use std::sync::Arc;
 
-use mapfold_map::level::{Changes, ContributionId, FeatureId, LevelMap};
-use mapfold_map::raster::{SensorClass, Tile, TileIndex, TileKey};
+use mapfold_map::level::{Changes, ContributionId, FeatureId, Level};
+use mapfold_map::raster::{SensorClass, Slice, SliceKey, Tile, TileIndex, TileKey};
 use mapfold_map::vector::{Chain, ChainId, Cluster, Segment};
 use rpds::{RedBlackTreeMapSync, RedBlackTreeSetSync};
 
@@ -29,6 +29,10 @@ impl Least for ChainId {
 impl Least for TileKey {
     const LEAST: Self =
         Self { class: SensorClass::Scanner, tile: TileIndex { x: i32::MIN, y: i32::MIN } };
+}
+
+impl Least for SliceKey {
+    const LEAST: Self = Self { key: TileKey::LEAST, slice: Slice(i64::MIN) };
 }
 
 /// A thing and the revision of its last change; `None` if it is no more.
@@ -153,14 +157,16 @@ pub(crate) struct MapHistory {
     pub(super) chains: History<ChainId, Chain>,
     /// Tiles.
     pub(super) tiles: History<TileKey, Tile>,
+    /// The sums that tiles are read from. Nobody is told of them; the store keeps them.
+    pub(super) slices: History<SliceKey, Tile>,
 }
 
 impl MapHistory {
-    /// Notes what a fold changed in `map` at `revision`.
+    /// Notes what a fold changed in `level` at `revision`.
     pub(super) fn record(
         &mut self,
         changes: &Changes,
-        map: &LevelMap,
+        level: &Level,
         revision: i64,
     ) -> ChangeCounts {
         fn all<K: Least, V: PartialEq>(
@@ -175,6 +181,10 @@ impl MapHistory {
             }
             count
         }
+        for at in &changes.slices {
+            self.slices.record(*at, revision, level.sums(at).cloned());
+        }
+        let map = level.map();
         ChangeCounts {
             features: all(&mut self.segments, &changes.segments, &map.segments, revision)
                 + all(&mut self.clusters, &changes.clusters, &map.clusters, revision)
@@ -183,8 +193,8 @@ impl MapHistory {
         }
     }
 
-    /// Whether all that `changes` names is in `map` as it is here.
-    pub(super) fn agrees(&self, changes: &Changes, map: &LevelMap) -> bool {
+    /// Whether all that `changes` names is in `level` as it is here.
+    pub(super) fn agrees(&self, changes: &Changes, level: &Level) -> bool {
         fn all<K: Least, V: PartialEq>(
             history: &History<K, V>,
             changed: &BTreeSet<K>,
@@ -192,7 +202,11 @@ impl MapHistory {
         ) -> bool {
             changed.iter().all(|key| history.get(key).and_then(|(_, value)| value) == map.get(key))
         }
-        all(&self.segments, &changes.segments, &map.segments)
+        let sums_agree =
+            |at: &SliceKey| self.slices.get(at).and_then(|(_, sums)| sums) == level.sums(at);
+        let map = level.map();
+        changes.slices.iter().all(sums_agree)
+            && all(&self.segments, &changes.segments, &map.segments)
             && all(&self.clusters, &changes.clusters, &map.clusters)
             && all(&self.chains, &changes.chains, &map.chains)
             && all(&self.tiles, &changes.tiles, &map.tiles)

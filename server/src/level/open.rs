@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use mapfold_map::raster::{Tile, TileKey};
+use mapfold_map::level::LevelConfig;
+use mapfold_map::raster::{SliceKey, Tile, TileKey};
 use mapfold_schema::border::{Target, parse_chain_id, parse_feature_id};
 
 use super::folding::Folding;
@@ -14,7 +15,7 @@ use super::recall::{self, Logged};
 use super::rows;
 use crate::store::acts::out_after;
 use crate::store::levels::LevelRow;
-use crate::store::map_rows::{FeatureRow, MapRows, StoredMap};
+use crate::store::map_rows::{FeatureRow, MapRows, StoredMap, TileRow};
 use crate::store::{Store, StoreError, tile_cells};
 
 /// Rows of the log that are read at once without their evidence.
@@ -44,7 +45,7 @@ pub(super) async fn open(
         Err(difference) => {
             tracing::error!(site, level, difference, "stored map is not its log's; folding again");
             metrics::counter!("mapfold_stored_map_faults_total").increment(1);
-            let folding = Box::new(Folding::empty(row.resolution_m));
+            let folding = Box::new(Folding::empty(&recall::config(&row)));
             let folding = catch_up(store, &row, folding).await?;
             mend(store, &row, stored, folding).await?
         }
@@ -108,31 +109,41 @@ async fn restore(
             format!("there are {} and {} acts", log.len(), acts.len()),
         ));
     }
-    let (resolution_m, stored) = (row.resolution_m, Arc::clone(stored));
+    let (config, stored) = (recall::config(row), Arc::clone(stored));
     let out = out_after(&acts);
-    aside(move || Ok(restored_with_history(resolution_m, &stored, &log, &out).map(Box::new))).await
+    aside(move || Ok(restored_with_history(&config, &stored, &log, &out).map(Box::new))).await
 }
 
 fn restored_with_history(
-    resolution_m: f64,
+    config: &LevelConfig,
     stored: &StoredMap,
     log: &[Logged],
     out: &BTreeSet<i64>,
 ) -> Result<Folding, String> {
-    let mut tiles: BTreeMap<TileKey, Tile> = BTreeMap::new();
-    for row in &stored.rows.tiles {
+    let rows = &stored.rows;
+    let mut sums: Vec<(SliceKey, Tile)> = Vec::new();
+    for row in &rows.slices {
         if let Some(content) = &row.content {
-            let tile = tile_cells::decode(content).map_err(|e| format!("{:?}: {e}", row.key))?;
-            tiles.insert(row.key, tile);
+            let tile = tile_cells::decode(content).map_err(|e| format!("{:?}: {e}", row.at))?;
+            sums.push((row.at, tile));
         }
     }
-    let mut folding = Folding::restored(resolution_m, stored.folded_revision, tiles, log, out);
+    let mut folding = Folding::restored(config, stored.folded_revision, sums, log, out);
     let map = folding.level().map().clone();
     let mut history = MapHistory::default();
-    for row in &stored.rows.tiles {
-        history.tiles.put(row.key, row.revision, map.tiles.get(&row.key).cloned());
+    for row in &rows.slices {
+        history.slices.put(row.at, row.revision, folding.level().sums(&row.at).cloned());
     }
-    let rows = &stored.rows;
+    for row in &rows.tiles {
+        let tile = map.tiles.get(&row.key);
+        if tile.is_none() != row.is_gone {
+            return Err(format!("tile {:?} is another", row.key));
+        }
+        history.tiles.put(row.key, row.revision, tile.cloned());
+    }
+    if let Some(key) = map.tiles.keys().find(|key| history.tiles.get(key).is_none()) {
+        return Err(format!("tile {key:?} is missing"));
+    }
     let MapHistory { segments, clusters, chains, .. } = &mut history;
     adopt(&rows.segments, &map.segments, parse_feature_id, rows::segment, segments)?;
     adopt(&rows.clusters, &map.clusters, parse_feature_id, rows::cluster, clusters)?;
@@ -180,17 +191,26 @@ async fn mend(
             rows.iter().map(|r| (r.feature.clone(), r.content.clone())).collect()
         };
         let history = folding.history_mut();
-        let MapHistory { segments, clusters, chains, tiles } = history;
+        let MapHistory { segments, clusters, chains, tiles, .. } = history;
         let rows = &stored.rows;
         redate(&rows.segments, &known(&true_rows.segments), parse_feature_id, revision, segments);
         redate(&rows.clusters, &known(&true_rows.clusters), parse_feature_id, revision, clusters);
         redate(&rows.chains, &known(&true_rows.chains), parse_chain_id, revision, chains);
-        let true_tiles: BTreeMap<TileKey, Option<Vec<u8>>> =
-            true_rows.tiles.iter().map(|r| (r.key, r.content.clone())).collect();
-        for row in &rows.tiles {
-            if true_tiles.get(&row.key) != Some(&row.content) {
-                redate_one(row.key, revision, tiles);
-            }
+        // A tile reads as its slices tell: if any of them was another, so may the tile have been.
+        let true_slices: BTreeMap<SliceKey, &Option<Vec<u8>>> =
+            true_rows.slices.iter().map(|r| (r.at, &r.content)).collect();
+        let true_tiles: BTreeMap<TileKey, &TileRow> =
+            true_rows.tiles.iter().map(|r| (r.key, r)).collect();
+        let stored_slices: BTreeMap<SliceKey, &Option<Vec<u8>>> =
+            rows.slices.iter().map(|r| (r.at, &r.content)).collect();
+        let known_slices = true_slices.keys().chain(stored_slices.keys());
+        let spoilt_tiles: BTreeSet<TileKey> = known_slices
+            .filter(|at| true_slices.get(at) != stored_slices.get(at))
+            .map(|at| at.key)
+            .chain(rows.tiles.iter().filter(|r| true_tiles.get(&r.key) != Some(r)).map(|r| r.key))
+            .collect();
+        for key in spoilt_tiles {
+            redate_one(key, revision, tiles);
         }
         let everything = rows::changed(folding.history(), -1, revision)?;
         Ok((folding, everything))

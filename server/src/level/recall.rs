@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
-use mapfold_map::level::{Batch, Contribution};
+use mapfold_map::level::{Batch, Contribution, LevelConfig};
+use mapfold_map::raster::SliceConfig;
 use mapfold_schema::border::{Limits, Target, Violation, check_contribution};
 use mapfold_schema::v1::{self, ContributionState};
 
+use super::accept::as_received;
 use super::open::{LOG_PAGE, aside};
 use crate::store::acts::{ActKind, ActRow};
 use crate::store::log::{FeaturesRow, LogRow};
@@ -105,7 +107,7 @@ pub(crate) async fn batch(
     revisions: &[i64],
 ) -> Result<Batch, StoreError> {
     let target = target(row);
-    let mut batch = Batch::default();
+    let mut batch = Batch::new(&config(row));
     for piece in revisions.chunks(LOG_PAGE as usize) {
         let rows = store.log_rows(&row.site, &row.level, piece).await?;
         if rows.len() != piece.len() {
@@ -126,6 +128,12 @@ pub(crate) async fn batch(
     Ok(batch)
 }
 
+/// What a level's fold depends on besides its log.
+pub(crate) fn config(row: &LevelRow) -> LevelConfig {
+    let standard = LevelConfig::standard(row.resolution_m);
+    LevelConfig { slices: SliceConfig { length_s: row.slice_s, ..standard.slices }, ..standard }
+}
+
 /// What the contributions of a level were checked against, but for limits.
 pub(crate) fn target(row: &LevelRow) -> Target {
     Target { frame: row.frame, resolution_m: row.resolution_m, limits: NO_LIMITS }
@@ -137,7 +145,7 @@ pub(crate) fn target(row: &LevelRow) -> Target {
 /// A row that does not hold what was accepted.
 pub(crate) fn whole(row: &LogRow, target: &Target) -> Result<Logged, StoreError> {
     let wire = payload::join(&row.payload.features, &row.payload.evidence);
-    logged(row.revision, row.state, wire, target)
+    logged(row.revision, row.state, row.received_at_us, wire, target)
 }
 
 /// A row of the log without its evidence.
@@ -145,12 +153,14 @@ pub(crate) fn whole(row: &LogRow, target: &Target) -> Result<Logged, StoreError>
 /// # Errors
 /// A row that does not hold what was accepted.
 pub(crate) fn features(row: &FeaturesRow, target: &Target) -> Result<Logged, StoreError> {
-    logged(row.revision, row.state, payload::without_evidence(&row.features), target)
+    let wire = payload::without_evidence(&row.features);
+    logged(row.revision, row.state, row.received_at_us, wire, target)
 }
 
 fn logged(
     revision: i64,
     state: ContributionState,
+    received_at_us: i64,
     wire: Result<v1::Contribution, PayloadError>,
     target: &Target,
 ) -> Result<Logged, StoreError> {
@@ -166,5 +176,6 @@ fn logged(
         corrupt(first.unwrap_or_else(|| "is refused".to_owned()))
     })?;
     let held = state == ContributionState::Held;
-    Ok(Logged { revision, held, contribution: Arc::new(contribution) })
+    let contribution = Arc::new(as_received(contribution, received_at_us));
+    Ok(Logged { revision, held, contribution })
 }

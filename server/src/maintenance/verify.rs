@@ -9,7 +9,7 @@ mod acts;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use mapfold_map::level::{Level, LevelConfig};
+use mapfold_map::level::Level;
 use mapfold_schema::border::Target;
 use mapfold_schema::digest::content_digest;
 use sha2::{Digest, Sha256};
@@ -131,8 +131,8 @@ impl Check {
         let mut check = Self {
             target: recall::target(row),
             stored,
-            stepwise: Folding::empty(row.resolution_m),
-            reversed: Level::new(LevelConfig::standard(row.resolution_m)),
+            stepwise: Folding::empty(&recall::config(row)),
+            reversed: Level::new(recall::config(row)),
             acts,
             astray: Vec::new(),
             read: 0,
@@ -300,13 +300,20 @@ impl Check {
         let tiles = |rows: &MapRows| -> Dated {
             rows.tiles
                 .iter()
-                .map(|row| (format!("{:?}", row.key), (row.revision, row.content.clone())))
+                .map(|row| (format!("{:?}", row.key), (row.revision, row.is_gone.then(Vec::new))))
+                .collect()
+        };
+        let slices = |rows: &MapRows| -> Dated {
+            rows.slices
+                .iter()
+                .map(|row| (format!("{:?}", row.at), (row.revision, row.content.clone())))
                 .collect()
         };
         self.compare("segment", &features(&rows.segments), &features(&refolded.segments));
         self.compare("cluster", &features(&rows.clusters), &features(&refolded.clusters));
         self.compare("chain", &features(&rows.chains), &features(&refolded.chains));
         self.compare("tile", &tiles(&rows), &tiles(&refolded));
+        self.compare("evidence", &slices(&rows), &slices(&refolded));
     }
 
     fn compare(&mut self, kind: &str, stored: &Dated, refolded: &Dated) {

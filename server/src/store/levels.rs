@@ -23,6 +23,8 @@ pub struct LevelRow {
     pub resolution_m: f64,
     /// Height of the floor, metres.
     pub elevation_m: f64,
+    /// Length of the slices of its evidence, seconds.
+    pub slice_s: u32,
     /// Newest revision of its log; 0 for an empty one.
     pub revision: i64,
     /// Revision up to which the stored map is folded; the map in memory may be ahead of it.
@@ -44,6 +46,8 @@ pub struct NewLevelRow<'a> {
     pub resolution_m: f64,
     /// Height of the floor, metres.
     pub elevation_m: f64,
+    /// Length of the slices of its evidence, seconds.
+    pub slice_s: u32,
     /// Now, microseconds since 1970.
     pub created_at_us: i64,
 }
@@ -60,8 +64,8 @@ impl Store {
         level: &NewLevelRow<'_>,
     ) -> Result<LevelRow, StoreError> {
         let made = sqlx::query(
-            "insert into levels (site, level, name, frame, resolution_m, elevation_m, revision, \
-             folded_revision, created_at_us) values ($1, $2, $3, $4, $5, $6, 0, 0, $7) \
+            "insert into levels (site, level, name, frame, resolution_m, elevation_m, slice_s, \
+             revision, folded_revision, created_at_us) values ($1, $2, $3, $4, $5, $6, $7, 0, 0, $8) \
              on conflict (site, level) do nothing",
         )
         .bind(site)
@@ -70,6 +74,7 @@ impl Store {
         .bind(level.frame.to_string())
         .bind(level.resolution_m)
         .bind(level.elevation_m)
+        .bind(i64::from(level.slice_s))
         .bind(level.created_at_us)
         .execute(self.writes())
         .await
@@ -90,6 +95,7 @@ impl Store {
             frame: level.frame,
             resolution_m: level.resolution_m,
             elevation_m: level.elevation_m,
+            slice_s: level.slice_s,
             revision: 0,
             folded_revision: 0,
             created_at_us: level.created_at_us,
@@ -102,8 +108,8 @@ impl Store {
     /// The store fails.
     pub async fn level(&self, site: &str, level: &str) -> Result<Option<LevelRow>, StoreError> {
         sqlx::query(
-            "select site, level, name, frame, resolution_m, elevation_m, revision, \
-             folded_revision, created_at_us from levels where site = $1 and level = $2",
+            "select site, level, name, frame, resolution_m, elevation_m, slice_s, \
+             revision, folded_revision, created_at_us from levels where site = $1 and level = $2",
         )
         .bind(site)
         .bind(level)
@@ -119,8 +125,8 @@ impl Store {
     /// The store fails.
     pub async fn levels(&self, site: &str) -> Result<Vec<LevelRow>, StoreError> {
         let rows = sqlx::query(
-            "select site, level, name, frame, resolution_m, elevation_m, revision, \
-             folded_revision, created_at_us from levels where site = $1",
+            "select site, level, name, frame, resolution_m, elevation_m, slice_s, \
+             revision, folded_revision, created_at_us from levels where site = $1",
         )
         .bind(site)
         .fetch_all(self.reads())
@@ -169,6 +175,7 @@ impl TryFrom<&AnyRow> for LevelRow {
 
     fn try_from(row: &AnyRow) -> Result<Self, StoreError> {
         let frame: String = get(row, TABLE, "frame")?;
+        let slice_s: i64 = get(row, TABLE, "slice_s")?;
         Ok(Self {
             site: get(row, TABLE, "site")?,
             level: get(row, TABLE, "level")?,
@@ -176,6 +183,7 @@ impl TryFrom<&AnyRow> for LevelRow {
             frame: frame.parse().map_err(|e| corrupt(TABLE, "frame", e))?,
             resolution_m: get(row, TABLE, "resolution_m")?,
             elevation_m: get(row, TABLE, "elevation_m")?,
+            slice_s: u32::try_from(slice_s).map_err(|e| corrupt(TABLE, "slice_s", e))?,
             revision: get(row, TABLE, "revision")?,
             folded_revision: get(row, TABLE, "folded_revision")?,
             created_at_us: get(row, TABLE, "created_at_us")?,

@@ -34,6 +34,8 @@ pub struct LogRow {
     pub revision: i64,
     /// What has become of it.
     pub state: v1::ContributionState,
+    /// When it came, microseconds since 1970, the server's clock.
+    pub received_at_us: i64,
     /// SHA-256 of its canonical CBOR, lower-case hexadecimal.
     pub digest: String,
     /// What was uploaded.
@@ -47,6 +49,8 @@ pub struct FeaturesRow {
     pub revision: i64,
     /// What has become of it.
     pub state: v1::ContributionState,
+    /// When it came, microseconds since 1970, the server's clock.
+    pub received_at_us: i64,
     /// CBOR of the contribution without its evidence.
     pub features: Vec<u8>,
 }
@@ -69,7 +73,7 @@ impl LogStretch {
 }
 
 static ROWS: Bulk = bulk_in!(
-    "select revision, state, digest, features, evidence from contributions \
+    "select revision, state, received_at_us, digest, features, evidence from contributions \
      where site = $1 and level = $2 and revision in ",
     from 3,
     ""
@@ -253,8 +257,8 @@ impl Store {
         limit: u32,
     ) -> Result<Vec<FeaturesRow>, StoreError> {
         let rows = sqlx::query(
-            "select revision, state, features from contributions where site = $1 and level = $2 \
-             and revision > $3 and revision <= $4 order by revision limit $5",
+            "select revision, state, received_at_us, features from contributions \
+             where site = $1 and level = $2 and revision > $3 and revision <= $4 order by revision limit $5",
         )
         .bind(site)
         .bind(level)
@@ -268,6 +272,7 @@ impl Store {
                 Ok(FeaturesRow {
                     revision: get(row, TABLE, "revision")?,
                     state: state(row)?,
+                    received_at_us: get(row, TABLE, "received_at_us")?,
                     features: get(row, TABLE, "features")?,
                 })
             })
@@ -285,7 +290,7 @@ async fn log_rows_between(
     limit: u32,
 ) -> Result<Vec<LogRow>, StoreError> {
     let rows = sqlx::query(
-        "select revision, state, digest, features, evidence from contributions \
+        "select revision, state, received_at_us, digest, features, evidence from contributions \
          where site = $1 and level = $2 and revision > $3 and revision < $4 \
          order by revision limit $5",
     )
@@ -325,6 +330,7 @@ fn log_row(row: &AnyRow) -> Result<LogRow, StoreError> {
     Ok(LogRow {
         revision: get(row, TABLE, "revision")?,
         state: state(row)?,
+        received_at_us: get(row, TABLE, "received_at_us")?,
         digest: get(row, TABLE, "digest")?,
         payload: Payload {
             features: get(row, TABLE, "features")?,

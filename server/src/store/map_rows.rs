@@ -3,7 +3,7 @@
 //! Written behind the log, each changed row once however many revisions touched it, together with
 //! the revision up to which the map is folded. Whoever opens the level reads it back.
 
-use mapfold_map::raster::{SensorClass, TileIndex, TileKey};
+use mapfold_map::raster::{SensorClass, Slice, SliceKey, TileIndex, TileKey};
 use sqlx::any::AnyRow;
 
 use super::row::{corrupt, get};
@@ -22,14 +22,25 @@ pub struct FeatureRow {
     pub content: Option<Vec<u8>>,
 }
 
-/// A tile's row.
+/// A tile's row: since when it reads as it does. What it reads as, its slices tell.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TileRow {
     /// Its layer and place.
     pub key: TileKey,
     /// Revision of its last change.
     pub revision: i64,
-    /// Its cells, see [`super::tile_cells`]; `None` if it is no more.
+    /// Whether it is no more.
+    pub is_gone: bool,
+}
+
+/// The row of a tile's evidence in one slice of time.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SliceRow {
+    /// Its layer, place and time.
+    pub at: SliceKey,
+    /// Revision of its last change.
+    pub revision: i64,
+    /// Its sums, see [`super::tile_cells`]; `None` if there are no more.
     pub content: Option<Vec<u8>>,
 }
 
@@ -44,12 +55,18 @@ pub struct MapRows {
     pub chains: Vec<FeatureRow>,
     /// Tiles.
     pub tiles: Vec<TileRow>,
+    /// Their evidence.
+    pub slices: Vec<SliceRow>,
 }
 
 impl MapRows {
     /// Number of rows.
     pub fn len(&self) -> usize {
-        self.segments.len() + self.clusters.len() + self.chains.len() + self.tiles.len()
+        self.segments.len()
+            + self.clusters.len()
+            + self.chains.len()
+            + self.tiles.len()
+            + self.slices.len()
     }
 
     /// Whether there are none.
@@ -101,10 +118,18 @@ static UPSERT_CHAINS: Bulk = bulk!(
 );
 
 static UPSERT_TILES: Bulk = bulk!(
-    "insert into tiles (site, level, sensor, x, y, revision, content) values ",
+    "insert into tiles (site, level, sensor, x, y, revision, is_gone) values ",
     7,
     from 1,
     " on conflict (site, level, sensor, x, y) do update set revision = excluded.revision, \
+     is_gone = excluded.is_gone"
+);
+
+static UPSERT_SLICES: Bulk = bulk!(
+    "insert into slices (site, level, sensor, x, y, slice, revision, content) values ",
+    8,
+    from 1,
+    " on conflict (site, level, sensor, x, y, slice) do update set revision = excluded.revision, \
      content = excluded.content"
 );
 
@@ -149,6 +174,21 @@ impl Store {
                     .bind(sensor_text(row.key.class))
                     .bind(i64::from(row.key.tile.x))
                     .bind(i64::from(row.key.tile.y))
+                    .bind(row.revision)
+                    .bind(i64::from(row.is_gone));
+            }
+            query.execute(&mut *tx).await?;
+        }
+        for (statement, piece) in UPSERT_SLICES.statements(&rows.slices) {
+            let mut query = sqlx::query(statement);
+            for row in piece {
+                query = query
+                    .bind(site)
+                    .bind(level)
+                    .bind(sensor_text(row.at.key.class))
+                    .bind(i64::from(row.at.key.tile.x))
+                    .bind(i64::from(row.at.key.tile.y))
+                    .bind(row.at.slice.0)
                     .bind(row.revision)
                     .bind(row.content.as_deref());
             }
@@ -217,7 +257,15 @@ impl Store {
         .fetch_all(&mut *tx)
         .await?;
         let tiles = sqlx::query(
-            "select sensor, x, y, revision, content from tiles where site = $1 and level = $2",
+            "select sensor, x, y, revision, is_gone from tiles where site = $1 and level = $2",
+        )
+        .bind(site)
+        .bind(level)
+        .fetch_all(&mut *tx)
+        .await?;
+        let slices = sqlx::query(
+            "select sensor, x, y, slice, revision, content from slices \
+             where site = $1 and level = $2",
         )
         .bind(site)
         .bind(level)
@@ -234,6 +282,7 @@ impl Store {
                 clusters: features(&clusters, "clusters")?,
                 chains: features(&chains, "chains")?,
                 tiles: tiles.iter().map(tile_row).collect::<Result<_, _>>()?,
+                slices: slices.iter().map(slice_row).collect::<Result<_, _>>()?,
             },
         }))
     }
@@ -271,21 +320,35 @@ fn feature_row(row: &AnyRow, table: &'static str) -> Result<FeatureRow, StoreErr
 
 fn tile_row(row: &AnyRow) -> Result<TileRow, StoreError> {
     const TABLE: &str = "tiles";
-    let sensor: String = get(row, TABLE, "sensor")?;
-    let place = |column| {
-        let value: i64 = get(row, TABLE, column)?;
-        i32::try_from(value).map_err(|e| corrupt(TABLE, column, e))
-    };
+    let is_gone: i64 = get(row, TABLE, "is_gone")?;
     Ok(TileRow {
-        key: TileKey {
-            class: SensorClass::ALL
-                .into_iter()
-                .find(|class| sensor_text(*class) == sensor)
-                .ok_or_else(|| corrupt(TABLE, "sensor", format!("{sensor:?} is no layer")))?,
-            tile: TileIndex { x: place("x")?, y: place("y")? },
-        },
+        key: tile_key(row, TABLE)?,
+        revision: get(row, TABLE, "revision")?,
+        is_gone: is_gone != 0,
+    })
+}
+
+fn slice_row(row: &AnyRow) -> Result<SliceRow, StoreError> {
+    const TABLE: &str = "slices";
+    Ok(SliceRow {
+        at: SliceKey { key: tile_key(row, TABLE)?, slice: Slice(get(row, TABLE, "slice")?) },
         revision: get(row, TABLE, "revision")?,
         content: get(row, TABLE, "content")?,
+    })
+}
+
+fn tile_key(row: &AnyRow, table: &'static str) -> Result<TileKey, StoreError> {
+    let sensor: String = get(row, table, "sensor")?;
+    let place = |column| {
+        let value: i64 = get(row, table, column)?;
+        i32::try_from(value).map_err(|e| corrupt(table, column, e))
+    };
+    Ok(TileKey {
+        class: SensorClass::ALL
+            .into_iter()
+            .find(|class| sensor_text(*class) == sensor)
+            .ok_or_else(|| corrupt(table, "sensor", format!("{sensor:?} is no layer")))?,
+        tile: TileIndex { x: place("x")?, y: place("y")? },
     })
 }
 

@@ -28,12 +28,14 @@ async fn what_was_made_is_described_and_not_made_twice() {
         name: None,
         resolution_m: Some(0.1),
         elevation_m: Some(3.5),
+        evidence_slice_s: Some(3600),
     };
     let made = admin.post(&levels, &level).await.expect(201);
     let here = made.header("location").to_owned();
     let made: LevelDescription = made.data();
     assert_eq!(made.frame.get_version_num(), 4);
     assert_eq!((made.resolution_m, made.elevation_m, made.revision), (0.1, 3.5, 0));
+    assert_eq!(made.evidence_slice_s, 3600);
     assert_eq!(admin.get(&here).await.expect(200).data::<LevelDescription>(), made);
     assert_eq!(admin.post(&levels, &level).await.code(409), "level_exists");
     let all: Vec<LevelDescription> = admin.get(&levels).await.expect(200).data();

@@ -46,8 +46,13 @@ impl Level {
     pub(crate) async fn create_at(client: &Client, site: &str, level: &str) -> Self {
         let new = NewSite { site: site.to_owned(), name: None };
         client.post(route::SITES, &new).await.expect(201);
-        let new =
-            NewLevel { level: level.to_owned(), name: None, resolution_m: None, elevation_m: None };
+        let new = NewLevel {
+            level: level.to_owned(),
+            name: None,
+            resolution_m: None,
+            elevation_m: None,
+            evidence_slice_s: None,
+        };
         client.post(&route::of_site(route::LEVELS, site), &new).await.expect(201);
         let made = Self { client: client.clone(), site: site.to_owned(), name: level.to_owned() };
         made.enrol("r1").await;

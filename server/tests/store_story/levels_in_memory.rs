@@ -6,6 +6,7 @@ use std::time::Duration;
 use mapfold_map::level::{LevelMap, Patch, apply};
 use mapfold_schema::border::map_patch;
 use mapfold_schema::codec::to_cbor;
+use mapfold_schema::instant::to_rfc3339;
 use mapfold_schema::v1::{self, ContributionState, RobotState};
 use mapfold_server::clock::{Clock, SystemClock};
 use mapfold_server::level::{
@@ -14,12 +15,13 @@ use mapfold_server::level::{
 use mapfold_server::store::Store;
 
 use crate::engines::Database;
-use crate::synthetic::{LEVEL, RESOLUTION_M, SITE, accepted, folded, furnish, looks};
+use crate::synthetic::{LEVEL, RECEIVED_US, RESOLUTION_M, SITE, accepted, folded, furnish, looks};
 
 on_each_engine!(
     what_is_submitted_is_acknowledged_folded_and_told,
     each_of_a_batch_has_an_answer_of_its_own,
     what_a_held_robot_sends_stays_out_of_the_map,
+    a_robot_whose_clock_is_ahead_is_not_believed_for_longer,
     a_full_queue_takes_none_of_a_batch,
     patches_from_any_revision_in_any_pages_lead_to_the_full_map,
     a_rectangle_limits_what_is_told,
@@ -139,6 +141,33 @@ async fn what_a_held_robot_sends_stays_out_of_the_map(database: Database) {
     let others: Vec<v1::Contribution> =
         looks.into_iter().filter(|look| look.robot != "anna").collect();
     assert_eq!(&*snapshot.map(), folded(&others).map());
+}
+
+/// What it says was seen at the latest when it came, also after a start: else its evidence would
+/// stand above what all others see until its clock is right.
+async fn a_robot_whose_clock_is_ahead_is_not_believed_for_longer(database: Database) {
+    let store = database.store().await;
+    furnish(&store).await;
+    let looks = looks(14, 12);
+    let told = |at_us| {
+        let at = |look: &v1::Contribution| v1::Contribution {
+            observed_at: to_rfc3339(at_us),
+            ..look.clone()
+        };
+        looks[..6].iter().map(at).chain(looks[6..].iter().cloned()).collect::<Vec<_>>()
+    };
+    let ahead = told(RECEIVED_US + 90 * 86_400_000_000);
+    let expected = folded(&told(RECEIVED_US));
+    assert_ne!(expected.map(), folded(&ahead).map());
+    let (levels, level) = open(&store, still()).await;
+    assert_eq!(&*submit_all(&level, &ahead).await.map(), expected.map());
+    // Read back with its evidence, and without.
+    let (_others, other) = open(&store, still()).await;
+    assert_eq!(&*other.snapshot().map(), expected.map());
+    drop(level);
+    levels.shutdown().await;
+    let (_again, level) = open(&store, still()).await;
+    assert_eq!(&*level.snapshot().map(), expected.map());
 }
 
 async fn a_full_queue_takes_none_of_a_batch(database: Database) {

@@ -76,6 +76,7 @@ async fn what_was_spoilt_is_found(database: Database) {
     assert!(report(&store).await.is_sound());
     let spoils = [
         ("update tiles set revision = revision + 1 where x = 0", "but changed at"),
+        ("update slices set slice = slice + 1000 where x = 0", "evidence SliceKey"),
         ("delete from segments where revision > 10", "is not stored"),
         ("update levels set revision = 41", "the log ends at revision 40, not 41"),
         ("update contributions set digest = '00' where revision = 9", "revision 9: its digest"),

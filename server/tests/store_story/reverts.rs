@@ -162,7 +162,7 @@ async fn a_span_holds_its_first_instant_and_not_its_last(database: Database) {
     furnish(&store).await;
     // Looks come every quarter of a second, in turn by three robots.
     store.append(SITE, LEVEL, &rows(55, 30)).await.unwrap();
-    let at = |look: i64| Some(START_US + look * 250_000);
+    let at = |look: i64| Some(START_US + look * 7_200_000_000);
     let span = |from_us, to_us| Targets::Span(Span { robot: "anna".into(), from_us, to_us });
     let planned = async |from, to| {
         store.plan_revert(SITE, LEVEL, &span(from, to)).await.unwrap().unwrap().moved

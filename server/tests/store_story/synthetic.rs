@@ -20,7 +20,7 @@ pub(crate) const RESOLUTION_M: f64 = 0.05;
 /// When the first look is taken, microseconds since 1970.
 pub(crate) const START_US: i64 = 1_790_000_000_000_000;
 /// When the server takes whatever it takes.
-pub(crate) const RECEIVED_US: i64 = START_US + 3_600_000_000;
+pub(crate) const RECEIVED_US: i64 = START_US + 100 * 86_400_000_000;
 
 pub(crate) const TARGET: Target =
     Target { frame: FRAME, resolution_m: RESOLUTION_M, limits: DEFAULT_LIMITS };
@@ -79,7 +79,8 @@ pub(crate) const ROBOTS: [&str; 3] = ["anna", "bert", "sonja"];
 
 fn look(numbers: &mut Numbers, i: usize) -> v1::Contribution {
     let sonar = i % 3 == 2;
-    let observed_at_us = START_US + i as i64 * 250_000;
+    // Some looks a day: the evidence of most tests is of several slices.
+    let observed_at_us = START_US + i as i64 * 7_200_000_000;
     let mut random = [0; 10];
     random.fill_with(|| numbers.next() as u8);
     let millis = observed_at_us.unsigned_abs() / 1000;
@@ -232,6 +233,7 @@ pub(crate) fn new_level(level: &str) -> NewLevelRow<'_> {
         frame: FRAME,
         resolution_m: RESOLUTION_M,
         elevation_m: -1.5,
+        slice_s: 86_400,
         created_at_us: START_US,
     }
 }

@@ -44,6 +44,7 @@ fn described(revision: i64) -> v1::LevelDescription {
         resolution_m: 0.05,
         tile_cells: 64,
         elevation_m: 0.0,
+        evidence_slice_s: 86_400,
         revision,
         folded_revision: revision,
         bounds: None,

@@ -395,6 +395,7 @@ async fn describe(State(shared): State<Shared>, headers: HeaderMap) -> Response 
             resolution_m: RESOLUTION_M,
             tile_cells: 64,
             elevation_m: 0.0,
+            evidence_slice_s: 86_400,
             revision: ledger.revision(),
             folded_revision: ledger.revision(),
             bounds: None,
