@@ -49,6 +49,9 @@ pub enum Error {
         /// The first words of the body, or what is wrong with it.
         body: String,
     },
+    /// A robot that cannot survey.
+    #[error("survey: {0}")]
+    Survey(mapfold_client::robot::SurveyorError),
     /// A database that cannot be made.
     #[error("database: {0}")]
     Database(String),

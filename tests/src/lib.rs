@@ -18,12 +18,14 @@
 //! * [`extraction`], [`yardstick`]: how well and how fast lines are found in scans, beside the least code that
 //!   finds lines.
 //! * [`range`]: simulated heads, their calibration, and how well their ranges are corrected.
+//! * [`change`]: how soon a map follows what has moved.
 //! * [`figure`]: a hallway's map as a picture.
 //! * [`evaluation`], [`speed`], [`statistics`], [`report`]: `mapfold-evaluate`, which writes tables between markers
 //!   into a page of text.
 
 pub mod api;
 pub mod carmen;
+pub mod change;
 pub mod coverage;
 pub mod database;
 pub mod error;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use mapfold_tests::{evaluation, extraction, figure, growth, honesty, range, speed};
+use mapfold_tests::{change, evaluation, extraction, figure, growth, honesty, range, speed};
 
 /// Measures Mapfold and rewrites the tables of a report between their markers.
 #[derive(Debug, Parser)]
@@ -51,6 +51,12 @@ enum Command {
         #[arg(long, value_name = "DIR")]
         data: Option<PathBuf>,
     },
+    /// Moves a shelf in a simulated hall and measures how soon the map believes it
+    Change {
+        /// The page with the markers `change`
+        #[arg(long, value_name = "FILE")]
+        report: PathBuf,
+    },
     /// Draws a hallway's vector map from a few scans of the committed log
     Figure {
         /// The SVG to write
@@ -87,6 +93,7 @@ async fn main() -> ExitCode {
         Command::Honesty { report } => honesty::table(&report),
         Command::Growth { report, data } => growth::tables(&report, data.as_deref()),
         Command::Extraction { report, data } => extraction::extraction(&report, data.as_deref()),
+        Command::Change { report } => change::table(&report),
         Command::Figure { out } => figure::write(&out).await.map(|()| Vec::new()),
         Command::Benches { report, criterion } => speed::benches(&report, &criterion),
     };
