@@ -109,6 +109,21 @@ fn after_the_first_pass_over_scans_nothing_is_allocated() {
                     "{kind}, {name}: pass {number}"
                 );
             }
+            // Of scans that it has not seen, once it has seen others of the kind.
+            let mut extractor = Extractor::for_scanner(&profile);
+            let (known, new): (Vec<_>, Vec<_>) =
+                scans.iter().cloned().enumerate().partition(|(i, _)| i % 4 != 0);
+            let of = |scans: Vec<(usize, Scan)>| -> Vec<Scan> {
+                scans.into_iter().map(|(_, scan)| scan).collect()
+            };
+            pass(&mut extractor, &of(known));
+            let new = of(new);
+            let (allocations, _) = pass(&mut extractor, &new);
+            assert!(
+                100 * allocations <= new.len(),
+                "{kind}, {name}: {allocations} in {}",
+                new.len()
+            );
         }
     }
 }

@@ -228,7 +228,8 @@ fn a_door_survives_a_hundred_looks_from_both_sides() {
             let at = |t: f64| segment.line.at(t).x;
             let (a, b) = (at(piece.span.from_m()), at(piece.span.to_m()));
             let (low, high) = (a.min(b), a.max(b));
-            assert!(high < 3.0 || low > 3.0, "a piece from {low} to {high} closes the door");
+            // The frame is where it is to 15 cm: three deviations of the looks that saw most of it.
+            assert!(high < 2.75 || low > 3.25, "a piece from {low} to {high} narrows the door");
         }
     }
     let facings: std::collections::BTreeSet<_> =
