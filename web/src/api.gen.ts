@@ -637,6 +637,10 @@ export interface components {
          * @enum {string}
          */
         ContributionState: "folded" | "held" | "reverted";
+        /** @description What an upload holds, for the description of the API. */
+        ContributionUpload: components["schemas"]["Contribution"] | components["schemas"]["Contribution"][];
+        /** @description What an upload is answered, for the description of the API. */
+        ContributionUploaded: components["schemas"]["Receipt"] | components["schemas"]["UploadAnswer"][];
         /** @description How much a level holds. */
         Counts: {
             /**
@@ -1628,6 +1632,13 @@ export interface operations {
                     "application/json": components["schemas"]["SiteDescription"][];
                 };
             };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description Refused; `code` says why */
             default: {
                 headers: {
@@ -1700,6 +1711,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["LevelDescription"][];
                 };
+            };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description Refused; `code` says why */
             default: {
@@ -1777,6 +1795,13 @@ export interface operations {
                     "application/json": components["schemas"]["LevelDescription"];
                 };
             };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description Refused; `code` says why */
             default: {
                 headers: {
@@ -1822,6 +1847,13 @@ export interface operations {
                     "application/json": components["schemas"]["ContributionPage"];
                 };
             };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description Refused; `code` says why */
             default: {
                 headers: {
@@ -1846,8 +1878,8 @@ export interface operations {
         /** @description One contribution, or an array of up to 64. May be coded as gzip or zstd. In CBOR a UUID (`id`, `frame`) is a byte string of 16 bytes, not text, and every `number` is a float of any width, never an integer; all else is as in JSON. */
         requestBody: {
             content: {
-                "application/cbor": components["schemas"]["Contribution"];
-                "application/json": components["schemas"]["Contribution"];
+                "application/cbor": components["schemas"]["ContributionUpload"];
+                "application/json": components["schemas"]["ContributionUpload"];
             };
         };
         responses: {
@@ -1857,7 +1889,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["Receipt"];
+                    "application/json": components["schemas"]["ContributionUploaded"];
                 };
             };
             /** @description `other_robot`: the token speaks for another robot */
@@ -1965,6 +1997,13 @@ export interface operations {
                     "application/json": components["schemas"]["ContributionRecord"];
                 };
             };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description Refused; `code` says why */
             default: {
                 headers: {
@@ -2056,6 +2095,13 @@ export interface operations {
                     "application/zip": number[];
                 };
             };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description `format_not_found` */
             404: {
                 headers: {
@@ -2115,6 +2161,13 @@ export interface operations {
                     "application/cbor": components["schemas"]["Patch"];
                 };
             };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description `cursor_expired`: `since` is ahead of the log; read from 0 */
             410: {
                 headers: {
@@ -2161,6 +2214,13 @@ export interface operations {
                     "application/json": components["schemas"]["RasterChanges"];
                     "application/cbor": components["schemas"]["RasterChanges"];
                 };
+            };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description `cursor_expired`: `since` is ahead of the log; read from 0 */
             410: {
@@ -2210,6 +2270,13 @@ export interface operations {
                     "application/octet-stream": number[];
                 };
             };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description `tile_not_found`: no evidence there */
             404: {
                 headers: {
@@ -2255,6 +2322,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["RevertPage"];
                 };
+            };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description Refused; `code` says why */
             default: {
@@ -2364,6 +2438,13 @@ export interface operations {
                     "application/json": components["schemas"]["RevertRecord"];
                 };
             };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description Refused; `code` says why */
             default: {
                 headers: {
@@ -2447,6 +2528,13 @@ export interface operations {
                     "image/png": number[];
                 };
             };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description Refused; `code` says why */
             default: {
                 headers: {
@@ -2485,6 +2573,13 @@ export interface operations {
                     "application/cbor": components["schemas"]["VectorPatch"];
                     "application/geo+json": Record<string, never>;
                 };
+            };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description `cursor_expired`: `since` is ahead of the log; read from 0 */
             410: {
@@ -2525,6 +2620,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["RobotDescription"][];
                 };
+            };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description Refused; `code` says why */
             default: {
@@ -2601,6 +2703,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["RobotDescription"];
                 };
+            };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description Refused; `code` says why */
             default: {

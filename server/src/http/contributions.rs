@@ -49,6 +49,28 @@ struct Judged {
     is_array: bool,
 }
 
+/// What an upload holds, for the description of the API.
+#[derive(utoipa::ToSchema, serde::Serialize)]
+#[serde(untagged)]
+#[expect(dead_code, reason = "only described: bodies are read item by item")]
+pub(super) enum ContributionUpload {
+    /// One.
+    One(Box<Contribution>),
+    /// At most 64.
+    Many(Vec<Contribution>),
+}
+
+/// What an upload is answered, for the description of the API.
+#[derive(utoipa::ToSchema, serde::Serialize)]
+#[serde(untagged)]
+#[expect(dead_code, reason = "only described: answers are written as they are")]
+pub(super) enum ContributionUploaded {
+    /// To one contribution.
+    One(Receipt),
+    /// To an array, in its order.
+    Many(Vec<UploadAnswer>),
+}
+
 /// Takes a contribution, or an array of up to 64 of them, into the log.
 ///
 /// The answer comes when it is on disk. Sending the same contribution again, under the same id,
@@ -59,13 +81,16 @@ struct Judged {
     post, path = route::CONTRIBUTIONS, operation_id = "contribute", tag = "contributions",
     params(("site" = String, Path), ("level" = String, Path)),
     request_body(
-        content((Contribution = "application/json"), (Contribution = "application/cbor")),
+        content(
+            (ContributionUpload = "application/json"),
+            (ContributionUpload = "application/cbor"),
+        ),
         description = "One contribution, or an array of up to 64. May be coded as gzip or zstd. \
             In CBOR a UUID (`id`, `frame`) is a byte string of 16 bytes, not text, and every \
             `number` is a float of any width, never an integer; all else is as in JSON.",
     ),
     responses(
-        (status = 201, body = Receipt, description = "On disk. For an array: an array of \
+        (status = 201, body = ContributionUploaded, description = "On disk. For an array: an array of \
             `{\"receipt\": ..}` or `{\"problem\": ..}`, in order."),
         (status = 403, description = "`other_robot`: the token speaks for another robot"),
         (status = 404, description = "`robot_not_found`: enrol the robot first"),

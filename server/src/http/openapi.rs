@@ -25,6 +25,9 @@ never an integer; all else is as in JSON. Every refusal is an \
 RFC 9457 problem (`application/problem+json`) with a stable `code`; where it is `retryable`, \
 `Retry-After` says when to try again. What a token does not reach is not found.";
 
+/// Tags of what is read with a validator.
+const TAGS_WITH_VALIDATORS: [&str; 5] = ["sites", "levels", "robots", "contributions", "map"];
+
 #[derive(utoipa::OpenApi)]
 #[openapi(
     info(title = "Mapfold", description = PREFACE, license(name = "MIT OR Apache-2.0")),
@@ -68,6 +71,9 @@ impl Modify for Common {
             let operations =
                 [&mut item.get, &mut item.put, &mut item.post, &mut item.delete, &mut item.patch];
             operations.into_iter().flatten().for_each(with_problems);
+            if let Some(read) = &mut item.get {
+                with_validator(read);
+            }
         }
     }
 }
@@ -88,6 +94,18 @@ fn with_problems(operation: &mut Operation) {
         .content(PROBLEM_JSON, content())
         .build();
     operation.responses.responses.insert("default".to_owned(), RefOr::T(any));
+}
+
+/// Reads bear an `ETag`: whoever has what would be answered is told only that.
+fn with_validator(read: &mut Operation) {
+    let tagged = read.tags.iter().flatten().any(|tag| TAGS_WITH_VALIDATORS.contains(&tag.as_str()));
+    // A stream of events has no end that could be validated.
+    if tagged && read.operation_id.as_deref() != Some("follow") {
+        let unchanged = ResponseBuilder::new()
+            .description("Not modified: `If-None-Match` has the `ETag` of what would be answered")
+            .build();
+        read.responses.responses.insert("304".to_owned(), RefOr::T(unchanged));
+    }
 }
 
 /// The description.

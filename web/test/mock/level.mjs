@@ -314,6 +314,7 @@ export function createMockLevel({ nowMs, seed = 1 }) {
       resolution_m: RESOLUTION_M,
       tile_cells: TILE_CELLS,
       elevation_m: 0,
+      evidence_slice_s: 86400,
       revision,
       folded_revision: revision,
       bounds: null,
