@@ -30,9 +30,14 @@ pub enum Layer {
 }
 
 impl Layer {
+    /// Whether a layer is among those that are asked for.
+    pub fn shows(self, id: LayerId) -> bool {
+        self == Self::All || self == Self::Only(id)
+    }
+
     /// The layers that are summed, in their canonical order.
     pub fn parts(self) -> impl Iterator<Item = LayerId> {
-        LayerId::ALL.into_iter().filter(move |id| self == Self::All || self == Self::Only(*id))
+        LayerId::ALL.into_iter().filter(move |id| self.shows(*id))
     }
 }
 
@@ -49,6 +54,15 @@ pub trait Raster {
         let first = TileIndex { x: i32::MIN, y: i32::MIN };
         self.between(layer, first, TileIndex { x: i32::MAX, y: i32::MAX })
     }
+}
+
+/// A raster that can tell what has changed.
+pub trait Dated: Raster {
+    /// The revision that it shows.
+    fn revision(&self) -> i64;
+
+    /// Where something has changed after revision `since`, in no order; a place may come twice.
+    fn changed_after(&self, since: i64) -> Box<dyn Iterator<Item = (LayerId, TileIndex)> + '_>;
 }
 
 /// What robots saw; a map knows of no prior.

@@ -8,9 +8,13 @@
 //!
 //! The colours keep their order of brightness in any colour vision: what was never seen is
 //! transparent, free space very light, obstacles dark; what only sonar speaks of has a hue of its
-//! own (orange against blue).
+//! own (orange against blue), and what only the prior does has none (grey).
+//!
+//! Up to [`ZOOM_COARSE`] a picture is made of the four below it, which are kept: one that shows a
+//! hundred thousand tiles costs what has changed in it, not what is in it.
 
 mod cache;
+mod pyramid;
 mod shades;
 
 use std::collections::BTreeMap;
@@ -19,17 +23,21 @@ use std::sync::Arc;
 
 use mapfold_map::raster::{TILE_SIDE, Tile, TileIndex};
 
-use super::layers::{Layer, LayerId, Raster};
+use super::layers::{Dated, Layer, LayerId, Raster};
 
 pub use cache::{Picture, PictureCache};
 pub use shades::{Shades, Shading};
 
 /// Pixels along a picture's side.
 pub const PICTURE_SIDE: usize = 256;
+/// Pixels of a picture.
+const PICTURE_PIXELS: usize = PICTURE_SIDE * PICTURE_SIDE;
 /// The zoom level at which one cell is one pixel.
 pub const ZOOM_NATIVE: u8 = 6;
 /// The highest zoom level.
 pub const ZOOM_MAX: u8 = 8;
+/// The highest zoom level whose pictures are parts of coarser ones, and kept for them.
+const ZOOM_COARSE: u8 = 4;
 
 /// A place in the pyramid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -46,6 +54,23 @@ impl Address {
     /// The picture at zoom level `z`; `None` beyond [`ZOOM_MAX`].
     pub fn new(z: u8, row: i32, col: i32) -> Option<Self> {
         (z <= ZOOM_MAX).then_some(Self { z, row, col })
+    }
+
+    /// The picture at zoom level `z` that shows a map tile; `None` if it has no number.
+    fn showing(z: u8, tile: TileIndex) -> Option<Self> {
+        let along = 1 << (ZOOM_MAX - z);
+        let row = i32::try_from(-i64::from(tile.y.div_euclid(along)) - 1).ok()?;
+        Some(Self { z, row, col: tile.x.div_euclid(along) })
+    }
+
+    /// The four pictures of the next zoom level that show the same: those above first, from left
+    /// to right. `None` for those without a number.
+    fn parts(self) -> [Option<Self>; 4] {
+        [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(down, across)| {
+            let row = self.row.checked_mul(2)?.checked_add(down)?;
+            let col = self.col.checked_mul(2)?.checked_add(across)?;
+            Some(Self { z: self.z + 1, row, col })
+        })
     }
 
     /// Map tiles along the picture's side: 256 at zoom level 0, 1 at 8.
@@ -80,15 +105,9 @@ impl Address {
         found
     }
 
-    /// Draws the picture from the shades of its tiles.
-    ///
-    /// # Errors
-    /// A fault of the encoder.
-    pub fn draw<'a>(
-        self,
-        tiles: impl IntoIterator<Item = (TileIndex, &'a Shades)>,
-    ) -> Result<Vec<u8>, png::EncodingError> {
-        let mut pixels = vec![0_u8; PICTURE_SIDE * PICTURE_SIDE];
+    /// The picture's pixels from the shades of its tiles.
+    fn pixels<'a>(self, tiles: impl IntoIterator<Item = (TileIndex, &'a Shades)>) -> Vec<u8> {
+        let mut pixels = vec![0_u8; PICTURE_PIXELS];
         let block = PICTURE_SIDE >> (ZOOM_MAX - self.z);
         if let Some((xs, ys)) = self.tiles() {
             for (tile, shades) in tiles {
@@ -99,7 +118,7 @@ impl Address {
                 }
             }
         }
-        shades::encode(&pixels)
+        pixels
     }
 }
 

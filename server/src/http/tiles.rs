@@ -12,7 +12,7 @@ use super::answer::{Reader, Tag, blocking};
 use super::problem::ApiError;
 use super::query::QueryOf;
 use super::state::App;
-use crate::exchange::layers::{Layer, LayerId, LayerTiles, Raster};
+use crate::exchange::layers::{Dated, Layer, LayerId, LayerTiles, Raster};
 use crate::exchange::png_tiles::{self, Address};
 use crate::level::Snapshot;
 
@@ -23,6 +23,16 @@ impl Raster for Snapshot {
         let LayerId::Sensor(class) = layer else { return Box::new(std::iter::empty()) };
         let key = |tile| TileKey { class, tile };
         Box::new(self.tiles_between(key(first), key(last)).map(|(key, tile)| (key.tile, tile)))
+    }
+}
+
+impl Dated for Snapshot {
+    fn revision(&self) -> i64 {
+        self.folded_revision()
+    }
+
+    fn changed_after(&self, since: i64) -> Box<dyn Iterator<Item = (LayerId, TileIndex)> + '_> {
+        Box::new(self.tiles_changed_after(since).map(|key| (LayerId::Sensor(key.class), key.tile)))
     }
 }
 

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use mapfold_map::level::Patch;
+use mapfold_map::raster::TileKey;
 use mapfold_schema::border::{
     chain_id, feature_id, wire_chain, wire_cluster, wire_patch, wire_segment, wire_tile_address,
 };
@@ -107,6 +108,11 @@ impl Snapshot {
             }
         }
         Ok(answer)
+    }
+
+    /// Places and layers of the tiles that changed after `since`, removed ones included.
+    pub fn tiles_changed_after(&self, since: i64) -> impl Iterator<Item = TileKey> {
+        self.history().tiles.changed(since, i64::MAX).map(|(_, key, _)| key)
     }
 
     /// A page of all that changed after `since`: up to `limit` things, or all those of one

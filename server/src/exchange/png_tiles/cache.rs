@@ -1,5 +1,6 @@
 //! Pictures that were drawn before, and the shades of the tiles in them.
 //!
+//! Coarse pictures are the business of [`super::pyramid`]. For the others:
 //! A picture is drawn again only when one of its tiles has changed, and then only the changed
 //! tiles are shaded again. A tile is recognised by its place in memory: a weak reference keeps
 //! that place from being used for another tile, but does not keep the tile.
@@ -11,7 +12,8 @@ use mapfold_map::raster::{Tile, TileIndex};
 use sha2::{Digest, Sha256};
 use uuid::Uuid;
 
-use super::{Address, Layer, LayerId, Layers, Raster, Shades, Shading};
+use super::pyramid::Pyramid;
+use super::{Address, Dated, Layer, LayerId, Layers, Shades, Shading, ZOOM_COARSE, shades};
 
 /// Most tiles whose shades are kept, about 5 kB each.
 const SHADES_MAX: usize = 8192;
@@ -28,8 +30,10 @@ pub struct Picture {
 }
 
 impl Picture {
-    fn new(png: Vec<u8>) -> Arc<Self> {
-        Arc::new(Self { digest: Sha256::digest(&png).into(), png })
+    /// Encodes pixels.
+    pub(super) fn of(pixels: &[u8]) -> Result<Arc<Self>, png::EncodingError> {
+        let png = shades::encode(pixels)?;
+        Ok(Arc::new(Self { digest: Sha256::digest(&png).into(), png }))
     }
 }
 
@@ -38,6 +42,7 @@ impl Picture {
 pub struct PictureCache {
     shading: Shading,
     blank: OnceLock<Arc<Picture>>,
+    pyramid: Pyramid,
     kept: Mutex<Kept>,
 }
 
@@ -80,13 +85,17 @@ impl PictureCache {
     pub fn picture(
         &self,
         frame: Uuid,
-        map: &impl Raster,
+        map: &impl Dated,
         address: Address,
         layer: Layer,
     ) -> Result<Arc<Picture>, png::EncodingError> {
+        if address.z <= ZOOM_COARSE {
+            let drawn = self.pyramid.picture(&self.shading, (frame, layer), map, address)?;
+            return drawn.map_or_else(|| self.blank(), Ok);
+        }
         let tiles = address.select(map, layer);
         if tiles.is_empty() {
-            return self.blank(address);
+            return self.blank();
         }
         let shaded: Vec<(TileIndex, Arc<Shaded>)> = tiles
             .iter()
@@ -98,17 +107,17 @@ impl PictureCache {
             return Ok(drawn.picture);
         }
         let tiles = shaded.iter().map(|(tile, shaded)| (*tile, &shaded.shades));
-        let picture = Picture::new(address.draw(tiles)?);
+        let picture = Picture::of(&address.pixels(tiles))?;
         let drawn = Drawn { serials, picture: Arc::clone(&picture) };
         self.kept().pictures.insert(key, drawn, PICTURES_MAX);
         Ok(picture)
     }
 
-    fn blank(&self, address: Address) -> Result<Arc<Picture>, png::EncodingError> {
+    fn blank(&self) -> Result<Arc<Picture>, png::EncodingError> {
         if let Some(blank) = self.blank.get() {
             return Ok(Arc::clone(blank));
         }
-        let blank = Picture::new(address.draw([])?);
+        let blank = Picture::of(&vec![0; super::PICTURE_PIXELS])?;
         Ok(Arc::clone(self.blank.get_or_init(|| blank)))
     }
 
@@ -136,7 +145,7 @@ impl PictureCache {
 /// A map that forgets: when the young half is full, the old half goes and the young one becomes
 /// old. What is asked for stays young.
 #[derive(Debug)]
-struct Generations<K, V> {
+pub(super) struct Generations<K, V> {
     young: BTreeMap<K, V>,
     old: BTreeMap<K, V>,
 }
@@ -148,14 +157,19 @@ impl<K, V> Default for Generations<K, V> {
 }
 
 impl<K: Ord + Copy, V: Clone> Generations<K, V> {
-    fn get(&mut self, key: &K) -> Option<V> {
+    pub(super) fn get(&mut self, key: &K) -> Option<V> {
         if let Some(value) = self.old.remove(key) {
             self.young.insert(*key, value);
         }
         self.young.get(key).cloned()
     }
 
-    fn insert(&mut self, key: K, value: V, max: usize) {
+    pub(super) fn remove(&mut self, key: &K) {
+        self.young.remove(key);
+        self.old.remove(key);
+    }
+
+    pub(super) fn insert(&mut self, key: K, value: V, max: usize) {
         self.old.remove(&key);
         if self.young.len() >= max / 2 {
             self.old = std::mem::take(&mut self.young);

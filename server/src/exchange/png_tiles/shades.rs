@@ -1,4 +1,7 @@
 //! From evidence to colours: one byte a cell, and the same tile ever coarser.
+//!
+//! The shades of each kind of evidence grow darker with the probability of an obstacle, in any
+//! colour vision; obstacles of different kinds can be told apart in any.
 
 use mapfold_map::raster::{LogOdds, SensorClass, TILE_CELLS, TILE_SIDE, Tile};
 
@@ -14,11 +17,28 @@ const UNKNOWN: u8 = 0;
 const SCANNER_RAMP: [[u8; 3]; 2] = [[0xf3, 0xf6, 0xfa], [0x10, 0x1c, 0x33]];
 /// ... and for what only sonar speaks of (the dark end is Okabe and Ito's vermilion, darkened).
 const SONAR_RAMP: [[u8; 3]; 2] = [[0xfd, 0xf2, 0xe2], [0xa8, 0x4a, 0x00]];
+/// ... and for what only the prior speaks of: no hue, since no robot saw it.
+const PRIOR_RAMP: [[u8; 3]; 2] = [[0xf0, 0xf0, 0xf0], [0x80, 0x80, 0x80]];
+/// All of them; where several speak, the first one's hue is taken.
+const RAMPS: [[[u8; 3]; 2]; 3] = [SCANNER_RAMP, SONAR_RAMP, PRIOR_RAMP];
+/// Shades there are: none, and the steps of each ramp.
+const SHADES: usize = 1 + RAMPS.len() * STEPS as usize;
+
+/// The place of a layer's ramp among all.
+fn ramp(layer: LayerId) -> u8 {
+    match layer {
+        LayerId::Sensor(SensorClass::Scanner) => 0,
+        LayerId::Sensor(SensorClass::Sonar) => 1,
+        LayerId::Prior => 2,
+    }
+}
 
 /// The step of each value of evidence, so that no cell needs an exponential.
 #[derive(Debug)]
 pub struct Shading {
     steps: Vec<u8>,
+    /// Of two shades, the one that stays when they become one pixel.
+    stronger: Box<[[u8; SHADES]; SHADES]>,
 }
 
 /// Values beyond this many log-odds steps read like this many.
@@ -29,7 +49,13 @@ impl Default for Shading {
         let steps = (-READ_LIMIT..=READ_LIMIT)
             .map(|v| (LogOdds(v).probability() * f64::from(STEPS - 1)).round() as u8)
             .collect();
-        Self { steps }
+        let mut table = Box::new([[UNKNOWN; SHADES]; SHADES]);
+        for (a, row) in table.iter_mut().enumerate() {
+            for (b, cell) in row.iter_mut().enumerate() {
+                *cell = stronger(a as u8, b as u8);
+            }
+        }
+        Self { steps, stronger: table }
     }
 }
 
@@ -42,28 +68,60 @@ impl Shading {
     /// The shades of the layers of one place.
     pub fn shade(&self, layers: &[(LayerId, &Tile)]) -> Shades {
         let mut levels = vec![UNKNOWN; LEVELS_LENGTH];
-        for (cell, shade) in levels[..TILE_CELLS].iter_mut().enumerate() {
-            let (mut sum, mut known, mut scanned) = (0, false, false);
-            for (class, tile) in layers {
-                let value = tile.cells()[cell];
-                sum += i64::from(value);
-                known |= value != 0;
-                scanned |= value != 0 && *class == LayerId::Sensor(SensorClass::Scanner);
-            }
-            if known {
-                *shade = 1 + self.step(sum) + if scanned { 0 } else { STEPS };
-            }
-        }
+        self.shade_cells(layers, &mut levels[..TILE_CELLS]);
         let mut finer_start = 0;
         let mut side = TILE_SIDE / 2;
         while side >= 1 {
             let coarser_start = finer_start + 4 * side * side;
             let (finer, coarser) = levels.split_at_mut(coarser_start);
-            halve(&finer[finer_start..], &mut coarser[..side * side], side);
+            self.halve(&finer[finer_start..], &mut coarser[..side * side], side);
             finer_start = coarser_start;
             side /= 2;
         }
         Shades { levels: levels.into_boxed_slice() }
+    }
+
+    fn shade_cells(&self, layers: &[(LayerId, &Tile)], shades: &mut [u8]) {
+        if let [(layer, tile)] = layers {
+            // By far the most: no sums, and nothing to choose between.
+            let first = 1 + ramp(*layer) * STEPS;
+            for (shade, value) in shades.iter_mut().zip(tile.cells()) {
+                let step = first + self.step(i64::from(*value));
+                *shade = if *value == 0 { UNKNOWN } else { step };
+            }
+            return;
+        }
+        for (cell, shade) in shades.iter_mut().enumerate() {
+            let (mut sum, mut hue) = (0, None);
+            for (layer, tile) in layers {
+                let value = tile.cells()[cell];
+                sum += i64::from(value);
+                if value != 0 {
+                    hue = Some(hue.map_or(ramp(*layer), |hue: u8| hue.min(ramp(*layer))));
+                }
+            }
+            if let Some(hue) = hue {
+                *shade = 1 + self.step(sum) + hue * STEPS;
+            }
+        }
+    }
+
+    /// Four pixels become one, of a square that has `side` pixels along its side then. An obstacle
+    /// wins, the surest first, so that a wall one cell thick stays a line at any zoom; else what is
+    /// surest free; else nothing is known.
+    pub(super) fn halve(&self, finer: &[u8], coarser: &mut [u8], side: usize) {
+        let pairs = finer.chunks_exact(4 * side).zip(coarser.chunks_exact_mut(side));
+        for (rows, to) in pairs {
+            let (one, other) = rows.split_at(2 * side);
+            let four = one.chunks_exact(2).zip(other.chunks_exact(2));
+            for (pixel, (a, b)) in to.iter_mut().zip(four) {
+                *pixel = self.stronger(self.stronger(a[0], a[1]), self.stronger(b[0], b[1]));
+            }
+        }
+    }
+
+    fn stronger(&self, a: u8, b: u8) -> u8 {
+        if a == b { a } else { self.stronger[usize::from(a)][usize::from(b)] }
     }
 }
 
@@ -84,23 +142,14 @@ impl Shades {
     }
 }
 
-/// Four pixels become one. An obstacle wins, the surest first, so that a wall one cell thick
-/// stays a line at any zoom; else what is surest free; else nothing is known.
-fn halve(finer: &[u8], coarser: &mut [u8], side: usize) {
-    for (at, pixel) in coarser.iter_mut().enumerate() {
-        let corner = 2 * (at / side) * (2 * side) + 2 * (at % side);
-        let four = [corner, corner + 1, corner + 2 * side, corner + 2 * side + 1];
-        *pixel = four.map(|i| finer[i]).into_iter().fold(UNKNOWN, stronger);
-    }
-}
-
+/// Of two shades, the one that stays when they become one pixel.
 fn stronger(a: u8, b: u8) -> u8 {
     if a == UNKNOWN || b == UNKNOWN {
         return a.max(b);
     }
     let step = |shade: u8| (shade - 1) % STEPS;
     let obstacle = step(a).max(step(b)) >= OCCUPIED_FROM;
-    // Equal steps: the scanner's, which has the lower number.
+    // Equal steps: the one of the first ramp, which has the lower number.
     match (step(a).cmp(&step(b)), obstacle) {
         (std::cmp::Ordering::Equal, _) => a.min(b),
         (std::cmp::Ordering::Greater, true) | (std::cmp::Ordering::Less, false) => a,
@@ -111,7 +160,7 @@ fn stronger(a: u8, b: u8) -> u8 {
 /// The colours of all shades: red, green, blue; number 0 is transparent.
 fn palette() -> Vec<u8> {
     let mut palette = vec![0, 0, 0];
-    for [free, occupied] in [SCANNER_RAMP, SONAR_RAMP] {
+    for [free, occupied] in RAMPS {
         for step in 0..STEPS {
             for (from, to) in free.into_iter().zip(occupied) {
                 let (from, to, step) = (i32::from(from), i32::from(to), i32::from(step));
@@ -137,3 +186,6 @@ pub(super) fn encode(pixels: &[u8]) -> Result<Vec<u8>, png::EncodingError> {
     writer.finish()?;
     Ok(bytes)
 }
+
+#[cfg(test)]
+mod colours;

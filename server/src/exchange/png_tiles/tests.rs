@@ -5,18 +5,55 @@ use mapfold_map::raster::{Cell, SensorClass, TILE_CELLS, TileKey};
 use uuid::Uuid;
 
 use super::*;
+use crate::exchange::layers::{Dated, LayerTiles, Raster};
+
+/// A map that goes on.
+pub(super) struct World {
+    map: LevelMap,
+    changes: Vec<TileKey>,
+}
+
+impl Raster for World {
+    fn between(&self, layer: LayerId, first: TileIndex, last: TileIndex) -> LayerTiles<'_> {
+        self.map.between(layer, first, last)
+    }
+}
+
+impl Dated for World {
+    fn revision(&self) -> i64 {
+        self.changes.len() as i64
+    }
+
+    fn changed_after(&self, since: i64) -> Box<dyn Iterator<Item = (LayerId, TileIndex)> + '_> {
+        let later = self.changes.iter().skip(since as usize);
+        Box::new(later.map(|key| (LayerId::Sensor(key.class), key.tile)))
+    }
+}
+
+impl World {
+    /// Puts a tile in the place of another, or takes it away, as one revision.
+    pub(super) fn put(&mut self, key: TileKey, tile: Option<Arc<Tile>>) {
+        match tile {
+            Some(tile) => self.map.tiles.insert(key, tile),
+            None => self.map.tiles.remove(&key),
+        };
+        self.changes.push(key);
+    }
+}
 
 /// A map whose cells hold the given evidence.
-fn map_of(cells: &[(SensorClass, i32, i32, i32)]) -> LevelMap {
+pub(super) fn map_of(cells: &[(SensorClass, i32, i32, i32)]) -> World {
     let mut tiles: BTreeMap<TileKey, Box<[i32; TILE_CELLS]>> = BTreeMap::new();
     for (class, column, row, value) in cells {
         let (tile, offset) = Cell { column: *column, row: *row }.tile();
         let key = TileKey { class: *class, tile };
         tiles.entry(key).or_insert_with(|| Box::new([0; TILE_CELLS]))[offset] = *value;
     }
-    let mut map = LevelMap::default();
-    map.tiles = tiles.into_iter().map(|(key, cells)| (key, Arc::new(Tile::new(cells)))).collect();
-    map
+    let mut world = World { map: LevelMap::default(), changes: Vec::new() };
+    for (key, cells) in tiles {
+        world.put(key, Some(Arc::new(Tile::new(cells))));
+    }
+    world
 }
 
 /// What a reader sees: (red, green, blue, alpha) of each pixel.
@@ -30,7 +67,7 @@ fn pixels(png: &[u8]) -> Vec<[u8; 4]> {
     bytes.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect()
 }
 
-fn drawn(map: &LevelMap, z: u8, row: i32, col: i32, layer: Layer) -> Vec<[u8; 4]> {
+fn drawn(map: &World, z: u8, row: i32, col: i32, layer: Layer) -> Vec<[u8; 4]> {
     let address = Address::new(z, row, col).unwrap();
     pixels(&PictureCache::default().picture(Uuid::nil(), map, address, layer).unwrap().png)
 }
@@ -107,18 +144,20 @@ fn where_nothing_is_known_the_picture_is_transparent_however_far_out() {
 
 #[test]
 fn a_picture_is_kept_until_one_of_its_tiles_changes() {
-    let mut map = map_of(&[(SCANNER, 0, -1, 300), (SCANNER, 100, -1, 300)]);
-    let (cache, address) = (PictureCache::default(), Address::new(5, 0, 0).unwrap());
-    let picture = |map: &LevelMap| cache.picture(Uuid::nil(), map, address, Layer::All).unwrap();
-    let first = picture(&map);
-    assert!(Arc::ptr_eq(&first, &picture(&map.clone())), "the same tiles, the same picture");
+    for z in [0, 3, 4, 5] {
+        let mut map = map_of(&[(SCANNER, 0, -1, 300), (SCANNER, 100, -1, 300)]);
+        let (cache, address) = (PictureCache::default(), Address::new(z, 0, 0).unwrap());
+        let picture = |map: &World| cache.picture(Uuid::nil(), map, address, Layer::All).unwrap();
+        let first = picture(&map);
+        assert!(Arc::ptr_eq(&first, &picture(&map)), "the same tiles, the same picture");
 
-    let changed = map_of(&[(SCANNER, 0, -1, 300), (SCANNER, 100, -1, -300)]);
-    let (key, tile) = changed.tiles.iter().next_back().unwrap();
-    map.tiles.insert(*key, Arc::clone(tile));
-    let second = picture(&map);
-    assert_ne!(first.digest, second.digest);
+        let changed = map_of(&[(SCANNER, 100, -1, -300)]);
+        let (key, tile) = changed.map.tiles.iter().next_back().unwrap();
+        map.put(*key, Some(Arc::clone(tile)));
+        let second = picture(&map);
+        assert_ne!(first.digest, second.digest);
 
-    map.tiles.remove(key);
-    assert_ne!(second.digest, picture(&map).digest);
+        map.put(*key, None);
+        assert_ne!(second.digest, picture(&map).digest);
+    }
 }
