@@ -26,12 +26,16 @@ pub const VECTOR: &str = "/api/v1/sites/{site}/levels/{level}/vector";
 pub const RASTER: &str = "/api/v1/sites/{site}/levels/{level}/raster";
 /// `GET`: one tile's evidence.
 pub const RASTER_TILE: &str = "/api/v1/sites/{site}/levels/{level}/raster/{x}/{y}";
+/// `GET`: the evidence of many tiles.
+pub const RASTER_BATCH: &str = "/api/v1/sites/{site}/levels/{level}/raster/batch";
 /// `GET`: picture pyramid, `{col}` with the suffix `.png`.
 pub const TILES: &str = "/api/v1/sites/{site}/levels/{level}/tiles/{z}/{row}/{col}";
 /// `GET`: all that changed, in pages.
 pub const PATCHES: &str = "/api/v1/sites/{site}/levels/{level}/patches";
 /// `GET`: live events.
 pub const EVENTS: &str = "/api/v1/sites/{site}/levels/{level}/events";
+/// `GET, POST, DELETE`: maps of other programs as the level's prior.
+pub const IMPORTS: &str = "/api/v1/sites/{site}/levels/{level}/imports";
 /// `GET`: exports.
 pub const EXPORTS: &str = "/api/v1/sites/{site}/levels/{level}/exports/{format}";
 /// `POST`, `GET`, `DELETE`: the page's session.

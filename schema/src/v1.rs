@@ -3,6 +3,7 @@
 mod contribution;
 mod event;
 mod features;
+mod import;
 mod level;
 mod patch;
 mod receipt;
@@ -22,8 +23,9 @@ pub use event::LevelEvent;
 pub use features::{
     Chain, ChainKind, Cluster, EndKind, Facing, Segment, SensorClass, SolidInterval,
 };
+pub use import::{Import, ImportPage, ImportReport};
 pub use level::{Bounds, Counts, LevelDescription, NewLevel};
-pub use patch::{Patch, RasterChanges, Removed, TileAddress, TileEvidence, VectorPatch};
+pub use patch::{Patch, RasterChanges, Removed, TileAddress, TileEvidence, TilePlace, VectorPatch};
 pub use receipt::{Receipt, UploadAnswer};
 pub use revert::{
     ChangeCounts, ChangeKind, ChangedFeature, FeatureKind, NewRevert, Revert, RevertPage,

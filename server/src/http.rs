@@ -10,6 +10,7 @@
 
 mod access;
 mod answer;
+mod batch;
 mod body;
 mod cap;
 mod check;
@@ -29,6 +30,7 @@ mod exports;
 #[cfg(test)]
 mod fixture;
 mod health;
+mod imports;
 mod levels;
 mod page;
 mod patches;

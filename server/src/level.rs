@@ -2,7 +2,7 @@
 //!
 //! A contribution is *accepted* (checked and encoded, by the caller), *appended* to the log
 //! together with whatever else is waiting, acknowledged, *folded*, *published* as a new
-//! [`Snapshot`] and *written behind*. Acts (reverts and their undoing) go into the same log and
+//! [`Snapshot`] and *written behind*. Acts (reverts and their undoing) and imports go into the same log and
 //! are folded like contributions. Memory is a cache of the store, never the reverse: whatever
 //! fails here, the level is dropped and read back. Knows the store and the map, not HTTP.
 
@@ -12,6 +12,7 @@ mod fold;
 pub(crate) mod folding;
 mod history;
 mod open;
+pub(crate) mod prior;
 pub(crate) mod recall;
 mod registry;
 mod reverting;

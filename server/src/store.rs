@@ -6,11 +6,13 @@
 //! * [`sites`], [`levels`], [`robots`], [`tokens`]: what people set up.
 //! * [`contributions`]: the append to a level's log, the one path to an acknowledgement.
 //! * [`acts`]: what operators did to a log; [`revision_list`]: the columns that say to what.
+//! * [`imports`]: maps of other programs in a log, and what they say.
 //! * [`log`]: reading the log; [`payload`]: the two columns that hold a contribution.
 //! * [`map_rows`]: the folded map, written behind; [`tile_cells`]: the column that holds a tile.
 
 pub mod acts;
 pub mod contributions;
+pub mod imports;
 pub mod levels;
 pub mod log;
 pub mod map_rows;

@@ -163,6 +163,42 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/sites/{site}/levels/{level}/imports": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * The imports of a level, newest first, in pages. The first one is the prior, unless it has no
+         *     report: then it took the prior away.
+         */
+        get: operations["list_imports"];
+        put?: never;
+        /**
+         * Makes a map of another program the prior of the level: a layer of its own below what robots saw.
+         *     Needs `map:edit`.
+         * @description The body is a zip of a YAML and the image that it names, as `map_server` writes them (PGM or PNG,
+         *     modes trinary, scale and raw), and as `exports/nav2` gives them:
+         *     `zip map.zip map.yaml map.pgm; curl --data-binary @map.zip -H 'content-type: application/zip' ...`.
+         *     It is read by the rules of `map_server`; yaw is honoured. Where its pixels do not coincide with
+         *     the level's cells, each cell is looked up at places no farther apart than half a pixel, and
+         *     obstacles win. The import is an entry of the level's log and takes the place of the one before.
+         *     The same map with the same trust again changes nothing and is answered in the same way. With
+         *     `preview=true` nothing is changed: the answer, of status 200, tells what was found.
+         */
+        post: operations["import"];
+        /**
+         * Takes the prior away: the level is then as if no map had been imported. An entry of the log of
+         *     its own. Needs `map:edit`.
+         */
+        delete: operations["remove_import"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/sites/{site}/levels/{level}/patches": {
         parameters: {
             query?: never;
@@ -193,6 +229,29 @@ export interface paths {
         };
         /** Which tiles changed after `since`, of all layers. */
         get: operations["read_raster_changes"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/sites/{site}/levels/{level}/raster/batch": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * The evidence of up to 256 tiles, such as `L/raster` names them.
+         * @description All numbers are little-endian: the bytes `mft1`, the count of tiles (`u32`), and for each tile in
+         *     the order of the request x (`i32`), y (`i32`), a length (`u32`) and so many bytes: zstd of its
+         *     64 x 64 cells, row by row from below, each an `i32` of log-odds in 0.01 nat, not clamped. The
+         *     length is 0 where there is no evidence.
+         */
+        get: operations["read_raster_batch"];
         put?: never;
         post?: never;
         delete?: never;
@@ -665,12 +724,17 @@ export interface components {
             in_force?: number;
             /**
              * Format: int64
+             * @description Tiles of the prior, if one was imported.
+             */
+            prior_tiles?: number;
+            /**
+             * Format: int64
              * @description Published segments.
              */
             segments: number;
             /**
              * Format: int64
-             * @description Published tiles of all layers.
+             * @description Published tiles of all layers of evidence.
              */
             tiles: number;
         };
@@ -696,6 +760,93 @@ export interface components {
          * @enum {string}
          */
         FeatureKind: "segment" | "cluster" | "chain";
+        /** @description An import as the log has it. */
+        Import: {
+            /** @description When the server took it. */
+            at: string;
+            /** @description Public id of the token that asked for it. */
+            author: string;
+            /**
+             * @description SHA-256 of the description, the image and the trust, lower-case hexadecimal; empty for a
+             *     removal.
+             */
+            digest: string;
+            /**
+             * Format: uuid
+             * @description Its identity.
+             */
+            id: string;
+            report?: components["schemas"]["ImportReport"] | null;
+            /**
+             * Format: int64
+             * @description Its place in the level's log.
+             */
+            revision: number;
+        };
+        /** @description `GET L/imports`: imports, newest first. */
+        ImportPage: {
+            /** @description The imports; the first one of the first page is the prior, unless it took it away. */
+            imports: components["schemas"]["Import"][];
+            /** @description `cursor` of the next page; absent on the last one. */
+            next?: string | null;
+        };
+        /** @description What was found in a map that was handed in. */
+        ImportReport: {
+            bounds?: components["schemas"]["Bounds"] | null;
+            /**
+             * Format: int32
+             * @description Pixels across.
+             */
+            columns: number;
+            /**
+             * Format: int64
+             * @description Pixels that speak for free space.
+             */
+            free: number;
+            /** @description Name of the image's file, as the description has it. */
+            image: string;
+            /** @description `trinary`, `scale` or `raw`. */
+            mode: string;
+            /**
+             * Format: int64
+             * @description Pixels that speak for an obstacle.
+             */
+            occupied: number;
+            /** @description Where the lower left corner of the image lies in the level. */
+            origin_m: number[];
+            /**
+             * Format: double
+             * @description Edge of a pixel.
+             */
+            resolution_m: number;
+            /**
+             * Format: int32
+             * @description Pixels down.
+             */
+            rows: number;
+            /**
+             * Format: int32
+             * @description Tiles of the level in which it says something.
+             */
+            tiles: number;
+            /**
+             * Format: double
+             * @description How much it is trusted, 0 to 1.
+             */
+            trust: number;
+            /**
+             * Format: int64
+             * @description Pixels that say nothing.
+             */
+            unknown: number;
+            /** @description What is doubtful about it, in words. */
+            warnings: string[];
+            /**
+             * Format: double
+             * @description By how much the image is turned about that corner, counter-clockwise.
+             */
+            yaw_rad: number;
+        };
         /** @description A new token. The secret is shown this once. */
         IssuedToken: {
             /** @description Public identity, for `token revoke`. */
@@ -1035,8 +1186,12 @@ export interface components {
         };
         /** @description `GET L/raster`: which tiles changed after `since`. */
         RasterChanges: {
+            /** @description New or changed tiles of the prior, which is no evidence of robots. */
+            prior?: components["schemas"]["TilePlace"][];
             /** @description Tiles that hold no evidence any more. */
             removed: components["schemas"]["TileAddress"][];
+            /** @description Tiles of which the prior says nothing any more. */
+            removed_prior?: components["schemas"]["TilePlace"][];
             /**
              * Format: double
              * @description Edge of a cell.
@@ -1440,6 +1595,19 @@ export interface components {
              *     the cell's offset in the tile (64 x 64, row by row from below) and value in 0.01 nat.
              */
             runs: number[];
+            /**
+             * Format: int32
+             * @description Tiles to the right of the level's origin.
+             */
+            x: number;
+            /**
+             * Format: int32
+             * @description Tiles up from the level's origin.
+             */
+            y: number;
+        };
+        /** @description A tile's place in a level's grid. */
+        TilePlace: {
             /**
              * Format: int32
              * @description Tiles to the right of the level's origin.
@@ -2131,6 +2299,155 @@ export interface operations {
             };
         };
     };
+    list_imports: {
+        parameters: {
+            query?: {
+                /** @description `next` of the page before. */
+                cursor?: string;
+                /** @description Imports of a page, at most 100; 20 if absent. */
+                limit?: number;
+            };
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description A page of imports */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ImportPage"];
+                };
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    import: {
+        parameters: {
+            query?: {
+                /** @description `true`: tell what is in the map, and change nothing. */
+                preview?: boolean;
+                /**
+                 * @description How much it is trusted, from 0 to 1; 0.5 if absent. An occupied cell says +4.0 nat times
+                 *     this, a free one -0.5 nat times this.
+                 */
+                trust?: number;
+            };
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/zip": number[];
+            };
+        };
+        responses: {
+            /** @description What was found, for a preview */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ImportReport"];
+                };
+            };
+            /** @description It is the prior */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Import"];
+                };
+            };
+            /** @description `payload_too_large`, `image_too_large` */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description `invalid_map_package`, `invalid_map_metadata`, `invalid_map_data`: what is wrong, where, and what to do */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    remove_import: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The removal, as the log has it */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Import"];
+                };
+            };
+            /** @description `prior_not_found`: there is none */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     read_patch: {
         parameters: {
             query?: {
@@ -2242,11 +2559,50 @@ export interface operations {
             };
         };
     };
+    read_raster_batch: {
+        parameters: {
+            query: {
+                /** @description Places of tiles as `x,y,x,y,...`, at most 256. */
+                tiles: string;
+                /** @description `scanner`, `sonar`, `prior`, or `all`, the sum of these; the sum without the prior if absent. */
+                layer?: "all" | "scanner" | "sonar" | "prior";
+            };
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The cells of the tiles */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/vnd.mapfold.tiles": number[];
+                };
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     read_raster_tile: {
         parameters: {
             query?: {
-                /** @description The class of sensors; the sum of all if absent. */
+                /** @description The class of sensors; the sum of all, without the prior, if neither this nor `layer` is there. */
                 sensor?: "scanner" | "sonar";
+                /** @description Instead of `sensor`: `scanner`, `sonar`, `prior`, or `all`, the sum of these. */
+                layer?: "all" | "scanner" | "sonar" | "prior";
             };
             header?: never;
             path: {

@@ -99,8 +99,11 @@ pub struct Counts {
     /// Published chains.
     #[serde(default)]
     pub chains: i64,
-    /// Published tiles of all layers.
+    /// Published tiles of all layers of evidence.
     pub tiles: i64,
+    /// Tiles of the prior, if one was imported.
+    #[serde(default)]
+    pub prior_tiles: i64,
 }
 
 #[cfg(test)]

@@ -64,6 +64,21 @@ pub struct RasterChanges {
     pub tiles: Vec<TileAddress>,
     /// Tiles that hold no evidence any more.
     pub removed: Vec<TileAddress>,
+    /// New or changed tiles of the prior, which is no evidence of robots.
+    #[serde(default)]
+    pub prior: Vec<TilePlace>,
+    /// Tiles of which the prior says nothing any more.
+    #[serde(default)]
+    pub removed_prior: Vec<TilePlace>,
+}
+
+/// A tile's place in a level's grid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+pub struct TilePlace {
+    /// Tiles to the right of the level's origin.
+    pub x: i32,
+    /// Tiles up from the level's origin.
+    pub y: i32,
 }
 
 /// The evidence of one layer in one tile.

@@ -4,7 +4,8 @@
 //! * [`Nav2Map`] writes what a level holds; yaw is 0, as most readers ignore it, and numbers are
 //!   written in full.
 //! * [`Description`] and [`Image`] read what others wrote, [`load`] makes cells of them by the
-//!   rules of `map_server`, and [`Prior`] puts these on the grid of a level. Whatever comes in is
+//!   rules of `map_server`, and [`Prior`] puts these on the grid of a level; [`Package`] does all of
+//!   it with the files of a zip. Whatever comes in is
 //!   bounded before room is made for it, and each refusal ([`ImportError`]) says where the fault is
 //!   and what to do.
 
@@ -12,6 +13,7 @@ mod cells;
 mod description;
 mod image;
 mod mapping;
+mod package;
 mod pgm;
 mod png_image;
 mod prior;
@@ -21,6 +23,7 @@ mod writer;
 pub use cells::{Cells, Loaded, UNKNOWN, load};
 pub use description::{DESCRIPTION_BYTES_MAX, Description};
 pub use image::{Image, ImageFormat, PIXELS_READ_MAX};
+pub use package::{IMAGE_BYTES_MAX, Import, Package};
 pub use prior::{FREE_NAT, OCCUPIED_NAT, Prior, Trust};
 pub use refusal::{ImportError, Warning};
 pub use writer::{Content, Nav2Error, Nav2Map, PIXELS_MAX, Style};

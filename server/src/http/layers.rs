@@ -31,6 +31,7 @@ use tower_http::compression::{CompressionLayer, DefaultPredicate};
 use tower_http::decompression::RequestDecompressionLayer;
 use tower_http::timeout::{RequestBodyDeadlineLayer, TimeoutLayer};
 
+use super::batch;
 use super::cap::cap;
 use super::exports;
 use super::observe::{RequestId, observe};
@@ -56,7 +57,9 @@ const RETRY_AFTER_S: u64 = 1;
 /// Puts all layers around the routes.
 pub(super) fn around(routes: Router, app: &App) -> Router {
     let limits = app.parts.limits;
-    let worth_it = DefaultPredicate::new().and(NotForContentType::const_new(exports::ZIP));
+    let worth_it = DefaultPredicate::new()
+        .and(NotForContentType::const_new(exports::ZIP))
+        .and(NotForContentType::const_new(batch::TILES));
     let admission = Arc::new(Semaphore::new(limits.requests_max));
     routes
         .layer(DefaultBodyLimit::max(limits.body_bytes))

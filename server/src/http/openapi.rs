@@ -10,8 +10,8 @@ use utoipa::{Modify, OpenApi as _};
 use super::access::SESSION_COOKIE;
 use super::problem::ApiError;
 use super::{
-    contributions, events, exports, health, levels, patches, raster, reverts, robots, session,
-    sites, tiles, vector,
+    batch, contributions, events, exports, health, imports, levels, patches, raster, reverts,
+    robots, session, sites, tiles, vector,
 };
 
 /// What stands at the head of the description.
@@ -19,7 +19,7 @@ const PREFACE: &str = "Mapfold keeps one shared map for a mixed fleet.
 
 Lengths are metres, angles radians, instants RFC 3339 in UTC. Reads answer JSON or CBOR (the same \
 types) by `Accept`, bear a strong `ETag`, take `If-None-Match`, and name the revision they show in \
-`Mapfold-Revision`. Bodies are JSON or CBOR and may be coded as gzip or zstd. In CBOR a UUID is a \
+`Mapfold-Revision`. Bodies are JSON or CBOR, but for maps of other programs, and may be coded as gzip or zstd. In CBOR a UUID is a \
 byte string of 16 bytes, not text, and what the schema calls a `number` is a float of any width, \
 never an integer; all else is as in JSON. Every refusal is an \
 RFC 9457 problem (`application/problem+json`) with a stable `code`; where it is `retryable`, \
@@ -37,8 +37,8 @@ const TAGS_WITH_VALIDATORS: [&str; 5] = ["sites", "levels", "robots", "contribut
         robots::list, robots::enrol, robots::describe, robots::update, robots::issue_token,
         contributions::upload, contributions::list, contributions::describe,
         reverts::create, reverts::list, reverts::describe, reverts::undo,
-        vector::read, raster::changes, raster::tile, tiles::read, patches::read, events::follow,
-        exports::read,
+        vector::read, raster::changes, raster::tile, batch::read, tiles::read, patches::read,
+        events::follow, exports::read, imports::create, imports::list, imports::remove,
         session::sign_in, session::describe, session::sign_out,
         health::live, health::ready, health::metrics,
     ),

@@ -10,7 +10,7 @@ use mapfold_schema::codec::{DecodeError, EncodeError};
 use mapfold_schema::problem::Problem;
 use mapfold_schema::v1::Scope;
 
-use crate::exchange::nav2::Nav2Error;
+use crate::exchange::nav2::{ImportError, Nav2Error};
 use crate::level::{LevelError, RevertError, SinceError, SubmitError};
 use crate::store::StoreError;
 use crate::store::acts::RevertRefusal;
@@ -45,6 +45,10 @@ pub(super) enum ApiError {
     TooManyItems { limit: usize },
     /// The body broke off or cannot be unpacked.
     BodyBroken,
+    /// The body is no zip.
+    NotZip,
+    /// A map of another program cannot be taken.
+    Import(ImportError),
     /// The body is not of a known type, or cannot be read.
     Body(DecodeError),
     /// The body can be read, but not taken.
@@ -181,6 +185,11 @@ impl ApiError {
             Self::Since(error) => ahead(error),
             Self::Level(LevelError::Closing) => Self::Closing.problem(),
             Self::Level(LevelError::Store(error)) | Self::Store(error) => of_store(error),
+            Self::NotZip => {
+                let detail = "Send a zip of a YAML and its image, as `application/zip`.";
+                of(415, "unsupported_media_type", detail)
+            }
+            Self::Import(error) => untaken(error),
             Self::Nav2(error) => {
                 let code = match error {
                     Nav2Error::Empty | Nav2Error::EmptyBox => "map_empty",
@@ -289,6 +298,25 @@ fn unreverted(error: &RevertError) -> Problem {
         RevertError::Behind { .. } => of(503, "revision_not_reached", detail),
         RevertError::Store(error) => of_store(error),
     }
+}
+
+fn untaken(error: &ImportError) -> Problem {
+    let (status, code) = match error {
+        ImportError::Zip(_) | ImportError::NoImage { .. } => (422, "invalid_map_package"),
+        ImportError::Yaml { .. }
+        | ImportError::MissingKey { .. }
+        | ImportError::DescriptionTooLong { .. }
+        | ImportError::Resolution { .. }
+        | ImportError::Extent { .. } => (422, "invalid_map_metadata"),
+        ImportError::ImageTooLarge { .. } | ImportError::ImageTooLong { .. } => {
+            (413, "image_too_large")
+        }
+        ImportError::ImageFormat
+        | ImportError::ImageEmpty { .. }
+        | ImportError::Pgm { .. }
+        | ImportError::Png(_) => (422, "invalid_map_data"),
+    };
+    of(status, code, sentence(&error.to_string()))
 }
 
 fn ahead(error: &SinceError) -> Problem {

@@ -2,7 +2,7 @@
 
 use axum::extract::Path;
 use axum::response::Response;
-use mapfold_map::raster::{self, TILE_CELLS, TileIndex, TileKey};
+use mapfold_map::raster::{Tile, TileIndex};
 use mapfold_schema::v1::{RasterChanges, SensorClass};
 use mapfold_schema::{codec, route};
 use serde::Deserialize;
@@ -11,7 +11,8 @@ use super::access::{LevelFor, Read};
 use super::answer::{DATA, Reader, Tag};
 use super::problem::ApiError;
 use super::query::{QueryOf, SinceInBox};
-use crate::level::Snapshot;
+use super::tiles::LayerName;
+use crate::exchange::layers::{Layer, LayerId, Raster};
 
 const BINARY: &str = "application/octet-stream";
 
@@ -47,9 +48,12 @@ pub(super) async fn changes(
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(super) struct TileQuery {
-    /// The class of sensors; the sum of all if absent.
+    /// The class of sensors; the sum of all, without the prior, if neither this nor `layer` is there.
     #[param(inline)]
     sensor: Option<SensorClass>,
+    /// Instead of `sensor`: `scanner`, `sonar`, `prior`, or `all`, the sum of these.
+    #[param(inline)]
+    layer: Option<LayerName>,
 }
 
 /// One tile's evidence: 64 x 64 cells, row by row from below, each a little-endian `i32` of
@@ -74,27 +78,33 @@ pub(super) async fn tile(
     reader: Reader,
 ) -> Result<Response, ApiError> {
     let media_type = reader.choose(&[BINARY])?;
+    let parts: Vec<LayerId> = match (query.sensor, query.layer) {
+        (Some(_), Some(_)) => {
+            return Err(ApiError::Query("`sensor` and `layer` exclude each other.".to_owned()));
+        }
+        (Some(sensor), None) => vec![LayerId::Sensor(sensor.into())],
+        (None, Some(layer)) => Layer::from(layer).parts().collect(),
+        (None, None) => Layer::All.parts().filter(|part| *part != LayerId::Prior).collect(),
+    };
     let missing = || ApiError::not_found("tile", format!("{x}/{y}"));
     let (Ok(x_index), Ok(y_index)) = (x.parse(), y.parse()) else { return Err(missing()) };
     let tile = TileIndex { x: x_index, y: y_index };
-    let bytes = sums(&level.level.snapshot(), tile, query.sensor).ok_or_else(missing)?;
+    let sums = sums(&*level.level.snapshot(), tile, &parts).ok_or_else(missing)?;
+    let bytes: Vec<u8> = sums.cells().iter().flat_map(|sum| sum.to_le_bytes()).collect();
     let tag = Tag::of_bytes(&bytes);
     Ok(reader.bytes(media_type, &tag, || bytes))
 }
 
-/// The cells of one layer, or of the sum of all, in little-endian; `None` without evidence.
-fn sums(snapshot: &Snapshot, tile: TileIndex, sensor: Option<SensorClass>) -> Option<Vec<u8>> {
-    let mut sums = vec![0_i32; TILE_CELLS];
-    let mut found = false;
-    for class in raster::SensorClass::ALL {
-        let asked_for = sensor.is_none_or(|sensor| sensor == SensorClass::from(class));
-        let layer = snapshot.tile(&TileKey { class, tile }).filter(|_| asked_for);
-        if let Some((_, layer)) = layer {
-            found = true;
-            for (sum, cell) in sums.iter_mut().zip(layer.cells()) {
-                *sum = sum.wrapping_add(*cell);
+/// The cells of the sum of some layers; `None` without evidence.
+pub(super) fn sums(raster: &impl Raster, at: TileIndex, parts: &[LayerId]) -> Option<Tile> {
+    let mut sums: Option<Tile> = None;
+    for part in parts {
+        for (_, tile) in raster.between(*part, at, at) {
+            match &mut sums {
+                None => sums = Some(tile.as_ref().clone()),
+                Some(sums) => sums.add_tile(tile),
             }
         }
     }
-    found.then(|| sums.iter().flat_map(|sum| sum.to_le_bytes()).collect())
+    sums
 }

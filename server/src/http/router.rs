@@ -8,8 +8,8 @@ use mapfold_schema::route;
 use super::problem::ApiError;
 use super::state::App;
 use super::{
-    contributions, docs, events, exports, health, layers, levels, page, patches, raster, reverts,
-    robots, session, sites, tiles, vector,
+    batch, contributions, docs, events, exports, health, imports, layers, levels, page, patches,
+    raster, reverts, robots, session, sites, tiles, vector,
 };
 
 /// All routes, with all layers around them.
@@ -33,11 +33,19 @@ pub fn router(app: &App) -> Router {
         .route(route::REVERT, get(reverts::describe).delete(reverts::undo))
         .route(route::VECTOR, get(vector::read))
         .route(route::RASTER, get(raster::changes))
+        .route(route::RASTER_BATCH, get(batch::read))
         .route(route::RASTER_TILE, get(raster::tile))
         .route(route::TILES, get(tiles::read))
         .route(route::PATCHES, get(patches::read))
         .route(route::EVENTS, get(events::follow))
         .route(route::EXPORTS, get(exports::read))
+        .route(
+            route::IMPORTS,
+            get(imports::list)
+                .post(imports::create)
+                .delete(imports::remove)
+                .layer(DefaultBodyLimit::max(upload_bytes)),
+        )
         .route(
             route::SESSION,
             get(session::describe).post(session::sign_in).delete(session::sign_out),

@@ -20,7 +20,9 @@ const PNG: &str = "image/png";
 
 impl Raster for Snapshot {
     fn between(&self, layer: LayerId, first: TileIndex, last: TileIndex) -> LayerTiles<'_> {
-        let LayerId::Sensor(class) = layer else { return Box::new(std::iter::empty()) };
+        let LayerId::Sensor(class) = layer else {
+            return Box::new(self.prior_between(first, last).map(|(at, tile)| (*at, tile)));
+        };
         let key = |tile| TileKey { class, tile };
         Box::new(self.tiles_between(key(first), key(last)).map(|(key, tile)| (key.tile, tile)))
     }
@@ -32,7 +34,9 @@ impl Dated for Snapshot {
     }
 
     fn changed_after(&self, since: i64) -> Box<dyn Iterator<Item = (LayerId, TileIndex)> + '_> {
-        Box::new(self.tiles_changed_after(since).map(|key| (LayerId::Sensor(key.class), key.tile)))
+        let seen = self.tiles_changed_after(since);
+        let seen = seen.map(|key| (LayerId::Sensor(key.class), key.tile));
+        Box::new(seen.chain(self.prior_changed_after(since).map(|at| (LayerId::Prior, at))))
     }
 }
 

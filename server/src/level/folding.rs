@@ -94,6 +94,11 @@ impl Folding {
             }
             Entry::Act(act) => move_batch(&mut self.level, act.kind, &act.moved)
                 .map_err(|misplaced| Stray::Misplaced { revision, misplaced })?,
+            Entry::Import(imported) => {
+                self.revision = revision;
+                let tiles = imported.replace(&mut self.history.prior);
+                return Ok(ChangeCounts { features: 0, tiles });
+            }
         };
         self.revision = revision;
         Ok(self.history.record(&changes, &self.level, revision))

@@ -12,6 +12,8 @@ use mapfold_map::raster::{SensorClass, Slice, SliceKey, Tile, TileIndex, TileKey
 use mapfold_map::vector::{Chain, ChainId, Cluster, Segment};
 use rpds::{RedBlackTreeMapSync, RedBlackTreeSetSync};
 
+use super::prior::PriorHistory;
+
 /// A key that no other comes before.
 pub(super) trait Least: Ord + Copy {
     /// That key.
@@ -159,6 +161,8 @@ pub(crate) struct MapHistory {
     pub(super) tiles: History<TileKey, Tile>,
     /// The sums that tiles are read from. Nobody is told of them; the store keeps them.
     pub(super) slices: History<SliceKey, Tile>,
+    /// Tiles of the prior: of the log's imports, not of the fold.
+    pub(super) prior: PriorHistory,
 }
 
 impl MapHistory {

@@ -11,6 +11,7 @@ use mapfold_schema::border::{Target, parse_chain_id, parse_feature_id};
 
 use super::folding::Folding;
 use super::history::{History, Least, MapHistory};
+use super::prior;
 use super::recall::{self, Logged};
 use super::rows;
 use crate::store::acts::out_after;
@@ -102,16 +103,24 @@ async fn restore(
         );
     }
     let acts = store.acts_between(&row.site, &row.level, 0, stored.folded_revision).await?;
-    if (log.len() + acts.len()) as i64 != stored.folded_revision {
+    let (imports, prior) = prior::restore(store, row, stored.folded_revision).await?;
+    if (log.len() + acts.len() + imports) as i64 != stored.folded_revision {
         return Err(spoilt(
             "contributions",
             format!("revisions up to {}", stored.folded_revision),
-            format!("there are {} and {} acts", log.len(), acts.len()),
+            format!("there are {}, {} acts and {imports} imports", log.len(), acts.len()),
         ));
     }
     let (config, stored) = (recall::config(row), Arc::clone(stored));
     let out = out_after(&acts);
-    aside(move || Ok(restored_with_history(&config, &stored, &log, &out).map(Box::new))).await
+    aside(move || {
+        let restored = restored_with_history(&config, &stored, &log, &out);
+        Ok(restored.map(|mut folding| {
+            folding.history_mut().prior = prior;
+            Box::new(folding)
+        }))
+    })
+    .await
 }
 
 fn restored_with_history(

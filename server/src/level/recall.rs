@@ -9,6 +9,7 @@ use mapfold_schema::v1::{self, ContributionState};
 
 use super::accept::as_received;
 use super::open::{LOG_PAGE, aside};
+use super::prior::Imported;
 use crate::store::acts::{ActKind, ActRow};
 use crate::store::log::{FeaturesRow, LogRow};
 use crate::store::payload::{self, PayloadError};
@@ -57,6 +58,8 @@ pub(crate) enum Entry {
     Contribution(Logged),
     /// An operator's.
     Act(Box<Act>),
+    /// A map of another program, as the prior.
+    Import(Box<Imported>),
 }
 
 impl Entry {
@@ -65,12 +68,13 @@ impl Entry {
         match self {
             Self::Contribution(logged) => logged.revision,
             Self::Act(act) => act.revision,
+            Self::Import(imported) => imported.revision,
         }
     }
 }
 
-/// The next entries of a level's log after revision `after`; none if it has ended. An act comes
-/// alone, so that there is only one batch in memory at a time.
+/// The next entries of a level's log after revision `after`; none if it has ended. An act or
+/// an import comes alone, so that there is only one batch in memory at a time.
 ///
 /// # Errors
 /// The store fails, or the log does not hold what was accepted.
@@ -83,9 +87,24 @@ pub(crate) async fn entries_after(
     if let Some(act) = stretch.act.filter(|_| stretch.contributions.is_empty()) {
         return Ok(vec![Entry::Act(Box::new(gather(store, row, &act).await?))]);
     }
+    if let Some(import) = stretch.import.filter(|_| stretch.contributions.is_empty()) {
+        return Ok(vec![Entry::Import(Box::new(imported(store, row, import).await?))]);
+    }
     let (rows, target) = (stretch.contributions, target(row));
     let entry = move |row: &LogRow| whole(row, &target).map(Entry::Contribution);
     aside(move || rows.iter().map(entry).collect()).await
+}
+
+/// Reads what an import says.
+///
+/// # Errors
+/// The store fails, or a row is spoilt.
+pub(crate) async fn imported(
+    store: &Store,
+    row: &LevelRow,
+    revision: i64,
+) -> Result<Imported, StoreError> {
+    Ok(store.import_row(&row.site, &row.level, revision).await?.into())
 }
 
 /// Reads what an act moves, a few rows at a time.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use mapfold_map::level::Patch;
-use mapfold_map::raster::TileKey;
+use mapfold_map::raster::{TileIndex, TileKey};
 use mapfold_schema::border::{
     chain_id, feature_id, wire_chain, wire_cluster, wire_patch, wire_segment, wire_tile_address,
 };
@@ -96,7 +96,20 @@ impl Snapshot {
             resolution_m: self.resolution_m(),
             tiles: Vec::new(),
             removed: Vec::new(),
+            prior: Vec::new(),
+            removed_prior: Vec::new(),
         };
+        for (_, at, tile) in self.history().prior.changed(since, i64::MAX) {
+            if !touches(Some(tile_bounds(at, self.resolution_m())), bbox) {
+                continue;
+            }
+            let place = v1::TilePlace { x: at.x, y: at.y };
+            match tile {
+                Some(_) => answer.prior.push(place),
+                None if since > 0 => answer.removed_prior.push(place),
+                None => {}
+            }
+        }
         for (_, key, tile) in self.history().tiles.changed(since, i64::MAX) {
             if !touches(Some(tile_bounds(key.tile, self.resolution_m())), bbox) {
                 continue;
@@ -113,6 +126,11 @@ impl Snapshot {
     /// Places and layers of the tiles that changed after `since`, removed ones included.
     pub fn tiles_changed_after(&self, since: i64) -> impl Iterator<Item = TileKey> {
         self.history().tiles.changed(since, i64::MAX).map(|(_, key, _)| key)
+    }
+
+    /// Places where the prior changed after `since`, removed tiles included.
+    pub fn prior_changed_after(&self, since: i64) -> impl Iterator<Item = TileIndex> {
+        self.history().prior.changed(since, i64::MAX).map(|(_, at, _)| at)
     }
 
     /// A page of all that changed after `since`: up to `limit` things, or all those of one

@@ -75,16 +75,19 @@ impl Snapshot {
             clusters: self.history.clusters.live_count() as i64,
             chains: self.history.chains.live_count() as i64,
             tiles: self.history.tiles.live_count() as i64,
+            prior_tiles: self.history.prior.live_count() as i64,
         }
     }
 
-    /// What the map covers; `None` while it is empty.
+    /// What the map and the prior cover; `None` while both are empty.
     pub fn bounds(&self) -> Option<v1::Bounds> {
         *self.bounds.get_or_init(|| {
             let tiles = self.tiles().map(|(key, _)| tile_bounds(key.tile, self.resolution_m));
+            let prior = self.history.prior.live();
+            let prior = prior.map(|(at, _)| tile_bounds(*at, self.resolution_m));
             let segments = self.segments().map(|(_, segment)| segment_bounds(segment));
             let clusters = self.clusters().map(|(_, cluster)| hull_bounds(&cluster.hull));
-            tiles.chain(segments.chain(clusters).flatten()).reduce(union)
+            tiles.chain(prior).chain(segments.chain(clusters).flatten()).reduce(union)
         })
     }
 
@@ -127,6 +130,20 @@ impl Snapshot {
         last: TileKey,
     ) -> impl Iterator<Item = (&TileKey, &Arc<Tile>)> {
         self.history.tiles.live_between(first, last)
+    }
+
+    /// The tiles of the prior from `first` to `last`, by place.
+    pub fn prior_between(
+        &self,
+        first: TileIndex,
+        last: TileIndex,
+    ) -> impl Iterator<Item = (&TileIndex, &Arc<Tile>)> {
+        self.history.prior.live_between(first, last)
+    }
+
+    /// One tile of the prior.
+    pub fn prior_tile(&self, at: TileIndex) -> Option<&Arc<Tile>> {
+        self.history.prior.get(&at)?.1
     }
 
     /// One tile and the revision at which it last changed; a tile that is no more (or never was)

@@ -15,6 +15,7 @@ use mapfold_schema::digest::content_digest;
 use sha2::{Digest, Sha256};
 
 use crate::level::folding::Folding;
+use crate::level::prior::Imported;
 use crate::level::recall::{self, Act, Entry, Logged};
 use crate::level::rows;
 use crate::store::acts::ActRow;
@@ -44,6 +45,8 @@ pub struct Report {
     pub reverted: usize,
     /// Acts read.
     pub acts: usize,
+    /// Imports read.
+    pub imports: usize,
     /// Segments of the refolded map.
     pub segments: usize,
     /// Clusters of the refolded map.
@@ -90,6 +93,7 @@ pub async fn verify(store: &Store, site: &str, level: &str) -> Result<Option<Rep
         let mut stretch = store.stretch_after(site, level, after, PAGE).await?;
         stretch.contributions.retain(|row| row.revision <= until);
         stretch.act = stretch.act.filter(|act| act.revision <= until);
+        stretch.import = stretch.import.filter(|import| *import <= until);
         let Some(end) = stretch.end() else { break };
         after = end;
         check = check.aside(move |check| check.fold(&stretch.contributions)).await?;
@@ -97,7 +101,17 @@ pub async fn verify(store: &Store, site: &str, level: &str) -> Result<Option<Rep
             check = match recall::gather(store, &row, &act).await {
                 Ok(act) => check.aside(move |check| check.step_act(act)).await?,
                 Err(error @ StoreError::Corrupt { .. }) => {
-                    check.pass_over(&act, &error.to_string());
+                    check.pass_over(act.revision, &error.to_string());
+                    check
+                }
+                Err(error) => return Err(error),
+            };
+        }
+        if let Some(import) = stretch.import {
+            check = match recall::imported(store, &row, import).await {
+                Ok(imported) => check.aside(move |check| check.step_import(imported)).await?,
+                Err(error @ StoreError::Corrupt { .. }) => {
+                    check.pass_over(import, &error.to_string());
                     check
                 }
                 Err(error) => return Err(error),
@@ -115,6 +129,7 @@ struct Check {
     stepwise: Folding,
     reversed: Level,
     acts: Acts,
+    imports: usize,
     /// Revisions of rows that say of themselves what the acts do not.
     astray: Vec<i64>,
     read: i64,
@@ -134,6 +149,7 @@ impl Check {
             stepwise: Folding::empty(&recall::config(row)),
             reversed: Level::new(recall::config(row)),
             acts,
+            imports: 0,
             astray: Vec::new(),
             read: 0,
             last: 0,
@@ -207,10 +223,18 @@ impl Check {
         self.compare_here();
     }
 
-    fn pass_over(&mut self, act: &ActRow, why: &str) {
-        self.follow(act.revision);
-        self.fault(format!("revision {}: {why}", act.revision));
-        self.stepwise.pass_over_until(act.revision + 1);
+    /// Imports are no part of the fold: only that they can be read is looked at.
+    fn step_import(&mut self, imported: Imported) {
+        self.imports += 1;
+        self.follow(imported.revision);
+        self.step(&Entry::Import(Box::new(imported)));
+        self.compare_here();
+    }
+
+    fn pass_over(&mut self, revision: i64, why: &str) {
+        self.follow(revision);
+        self.fault(format!("revision {revision}: {why}"));
+        self.stepwise.pass_over_until(revision + 1);
         self.compare_here();
     }
 
@@ -369,6 +393,7 @@ impl Check {
             contributions: self.read,
             reverted: self.acts.out.len(),
             acts: self.acts.count,
+            imports: self.imports,
             segments: map.segments.len(),
             clusters: map.clusters.len(),
             chains: map.chains.len(),

@@ -196,7 +196,7 @@ impl Store {
 }
 
 /// Takes the lock of the level's row, and its next revision.
-async fn next_revision(tx: &mut Tx, site: &str, level: &str) -> Result<i64, StoreError> {
+pub(super) async fn next_revision(tx: &mut Tx, site: &str, level: &str) -> Result<i64, StoreError> {
     let row = sqlx::query(
         "update levels set revision = revision + 1 where site = $1 and level = $2 \
          returning revision",

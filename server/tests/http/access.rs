@@ -71,11 +71,15 @@ fn table(floor: &Level, look: &Value) -> Vec<Row> {
         ("GET", level(route::VECTOR), none.clone(), read),
         ("GET", level(route::RASTER), none.clone(), read),
         ("GET", cells, none.clone(), read),
+        ("GET", format!("{}?tiles=0,0", level(route::RASTER_BATCH)), none.clone(), read),
         ("GET", tile, none.clone(), read),
         ("GET", level(route::PATCHES), none.clone(), read),
         ("GET", level(route::EVENTS), none.clone(), read),
         ("GET", export("geojson"), none.clone(), read),
         ("GET", export("nav2"), none.clone(), read),
+        ("GET", level(route::IMPORTS), none.clone(), read),
+        ("POST", level(route::IMPORTS), json!("no zip"), [401, 403, 404, 403, 415]),
+        ("DELETE", level(route::IMPORTS), none.clone(), [401, 403, 404, 403, 404]),
         ("GET", route::SESSION.to_owned(), none.clone(), [401, 200, 200, 200, 200]),
         ("DELETE", route::SESSION.to_owned(), none, [401, 204, 204, 204, 204]),
     ]
@@ -144,6 +148,7 @@ fn template_of(path: &str) -> String {
         Some([_, _, "tiles", ..]) => {
             parts.splice(8.., ["{z}", "{row}", "{col}.png"]).for_each(drop);
         }
+        Some([_, _, "raster", batch]) if batch.starts_with("batch?") => parts[8] = "batch",
         Some([_, _, "raster", _, _]) => parts.splice(8.., ["{x}", "{y}"]).for_each(drop),
         Some([_, _, "exports", _]) => parts[8] = "{format}",
         _ => {}

@@ -31,6 +31,25 @@ pub enum ImportError {
         /// How long it may be.
         max: usize,
     },
+    /// No zip, or one that does not hold a map.
+    #[error(
+        "the zip cannot be taken: {0}; send one of two files, a YAML and the image that it names"
+    )]
+    Zip(String),
+    /// The image that the description names is not there.
+    #[error("the description names the image `{image}`, but there is only {found}")]
+    NoImage {
+        /// The image.
+        image: String,
+        /// What is there.
+        found: String,
+    },
+    /// The image's file is longer than any that is taken.
+    #[error("the image has more than {max} bytes: save it as a binary PGM (P5) or a PNG")]
+    ImageTooLong {
+        /// How long it may be.
+        max: usize,
+    },
     /// Neither PGM nor PNG.
     #[error(
         "the image is neither PGM (P2, P5) nor PNG: convert it, for instance with `convert map.bmp map.pgm`"

@@ -1,0 +1,179 @@
+//! `L/imports`: maps of other programs as the level's prior.
+
+use axum::body::Bytes;
+use axum::extract::{Request, State};
+use axum::http::HeaderMap;
+use axum::response::Response;
+use mapfold_schema::route;
+use mapfold_schema::v1::{Import, ImportPage, ImportReport};
+use serde::Deserialize;
+use sha2::{Digest, Sha256};
+
+use super::access::{Edit, LevelFor, Read};
+use super::answer::{Reader, blocking, created};
+use super::body::{self, media_type};
+use super::exports::ZIP;
+use super::problem::ApiError;
+use super::query::{QueryOf, before};
+use super::state::App;
+use crate::auth;
+use crate::exchange::nav2::{Package, Trust};
+use crate::store::imports::NewImport;
+
+/// Imports of a page, if the request names no number; and at most.
+const PAGE: u32 = 20;
+const PAGE_MAX: u32 = 100;
+
+/// How a map is taken.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(super) struct ImportQuery {
+    /// `true`: tell what is in the map, and change nothing.
+    #[serde(default)]
+    preview: bool,
+    /// How much it is trusted, from 0 to 1; 0.5 if absent. An occupied cell says +4.0 nat times
+    /// this, a free one -0.5 nat times this.
+    trust: Option<f64>,
+}
+
+/// Which imports are asked for.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(super) struct PageQuery {
+    /// `next` of the page before.
+    cursor: Option<String>,
+    /// Imports of a page, at most 100; 20 if absent.
+    limit: Option<u32>,
+}
+
+/// Makes a map of another program the prior of the level: a layer of its own below what robots saw.
+/// Needs `map:edit`.
+///
+/// The body is a zip of a YAML and the image that it names, as `map_server` writes them (PGM or PNG,
+/// modes trinary, scale and raw), and as `exports/nav2` gives them:
+/// `zip map.zip map.yaml map.pgm; curl --data-binary @map.zip -H 'content-type: application/zip' ...`.
+/// It is read by the rules of `map_server`; yaw is honoured. Where its pixels do not coincide with
+/// the level's cells, each cell is looked up at places no farther apart than half a pixel, and
+/// obstacles win. The import is an entry of the level's log and takes the place of the one before.
+/// The same map with the same trust again changes nothing and is answered in the same way. With
+/// `preview=true` nothing is changed: the answer, of status 200, tells what was found.
+#[utoipa::path(
+    post, path = route::IMPORTS, operation_id = "import", tag = "map",
+    params(("site" = String, Path), ("level" = String, Path), ImportQuery),
+    request_body(content = Vec<u8>, content_type = "application/zip"),
+    responses(
+        (status = 200, body = ImportReport, description = "What was found, for a preview"),
+        (status = 201, body = Import, description = "It is the prior"),
+        (status = 413, description = "`payload_too_large`, `image_too_large`"),
+        (status = 422, description = "`invalid_map_package`, `invalid_map_metadata`, `invalid_map_data`: what is wrong, where, and what to do"),
+    )
+)]
+pub(super) async fn create(
+    State(app): State<App>,
+    level: LevelFor<Edit>,
+    QueryOf(query): QueryOf<ImportQuery>,
+    reader: Reader,
+    headers: HeaderMap,
+    request: Request,
+) -> Result<Response, ApiError> {
+    let ImportQuery { preview, trust } = query;
+    let trust = trust.map_or(Some(Trust::STANDARD), Trust::new);
+    let trust = trust.ok_or_else(|| ApiError::Query("`trust` is from 0 to 1.".to_owned()))?;
+    let sent = media_type(&headers).unwrap_or_default();
+    if !sent.split(';').next().is_some_and(|essence| essence.trim().eq_ignore_ascii_case(ZIP)) {
+        return Err(ApiError::NotZip);
+    }
+    let bytes: Bytes = body::read(request, app.parts.limits.upload_bytes).await?;
+    let _turn = app.exports.acquire().await.ok().ok_or(ApiError::Closing)?;
+    let resolution_m = level.level.resolution_m();
+    let (id, at_us) = (app.parts.chance.uuid(), app.now_us());
+    let author = auth::granted_by(&level.caller).to_owned();
+    let new = blocking(move || {
+        let package = Package::unzip(&bytes).map_err(ApiError::Import)?;
+        let import = package.import(resolution_m, trust).map_err(ApiError::Import)?;
+        let tiles = import.prior.tiles.iter();
+        let tiles = tiles.map(|(at, tile)| Ok((*at, NewImport::column(tile)?)));
+        Ok(NewImport {
+            id,
+            digest: digest(&package, trust),
+            author,
+            at_us,
+            tiles: if preview { Vec::new() } else { tiles.collect::<Result<_, ApiError>>()? },
+            report: Some(import.report),
+        })
+    })
+    .await?;
+    if preview {
+        return reader.small(&new.report);
+    }
+    let made = level.level.import(&new).await?;
+    let made = made.ok_or_else(|| ApiError::Internal("an import came to nothing".to_owned()))?;
+    let all = route::of_level(route::IMPORTS, level.level.site(), level.level.level());
+    created(&reader, Some(&all), &made)
+}
+
+/// The imports of a level, newest first, in pages. The first one is the prior, unless it has no
+/// report: then it took the prior away.
+#[utoipa::path(
+    get, path = route::IMPORTS, operation_id = "list_imports", tag = "map",
+    params(("site" = String, Path), ("level" = String, Path), PageQuery),
+    responses((status = 200, body = ImportPage, description = "A page of imports"))
+)]
+pub(super) async fn list(
+    State(app): State<App>,
+    level: LevelFor<Read>,
+    QueryOf(query): QueryOf<PageQuery>,
+    reader: Reader,
+) -> Result<Response, ApiError> {
+    let before = before(query.cursor.as_deref())?;
+    let limit = query.limit.unwrap_or(PAGE);
+    if !(1..=PAGE_MAX).contains(&limit) {
+        return Err(ApiError::Query(format!("`limit` is 1 to {PAGE_MAX}.")));
+    }
+    let (site, name) = (level.level.site(), level.level.level());
+    reader.small(&app.store().import_page(site, name, before, limit).await?)
+}
+
+/// Takes the prior away: the level is then as if no map had been imported. An entry of the log of
+/// its own. Needs `map:edit`.
+#[utoipa::path(
+    delete, path = route::IMPORTS, operation_id = "remove_import", tag = "map",
+    params(("site" = String, Path), ("level" = String, Path)),
+    responses(
+        (status = 200, body = Import, description = "The removal, as the log has it"),
+        (status = 404, description = "`prior_not_found`: there is none"),
+    )
+)]
+pub(super) async fn remove(
+    State(app): State<App>,
+    level: LevelFor<Edit>,
+    reader: Reader,
+) -> Result<Response, ApiError> {
+    let new = NewImport {
+        id: app.parts.chance.uuid(),
+        digest: String::new(),
+        author: auth::granted_by(&level.caller).to_owned(),
+        at_us: app.now_us(),
+        report: None,
+        tiles: Vec::new(),
+    };
+    let removed = level.level.import(&new).await?;
+    let name = || format!("{}/{}", level.level.site(), level.level.level());
+    reader.small(&removed.ok_or_else(|| ApiError::not_found("prior", name()))?)
+}
+
+/// By what the same import is known.
+fn digest(package: &Package, trust: Trust) -> String {
+    use std::fmt::Write as _;
+    let mut digest = Sha256::new();
+    for part in [&package.description[..], &package.image, &trust.get().to_le_bytes()] {
+        digest.update((part.len() as u64).to_le_bytes());
+        digest.update(part);
+    }
+    digest.finalize().iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}"); // writing to a String cannot fail
+        text
+    })
+}
