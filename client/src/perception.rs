@@ -19,6 +19,7 @@ pub mod ends;
 mod explain;
 pub mod fit;
 mod guess;
+mod incidence;
 pub mod plausibility;
 pub mod points;
 pub mod seen_through;

@@ -15,3 +15,4 @@ pub use preset::{PRESETS, preset};
 pub use profile::{MountedAt, ProfileError, ScannerProfile, Sensors, SonarProfile};
 pub use reading::{Ring, Scan, ScanGeometry, Sonar};
 pub use table::{CorrectedRange, EXTRAPOLATED_M, RangeTable};
+pub(crate) use table::{Place, Spot as TableSpot};
