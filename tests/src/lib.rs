@@ -19,6 +19,7 @@
 //!   finds lines.
 //! * [`range`]: simulated heads, their calibration, and how well their ranges are corrected.
 //! * [`change`]: how soon a map follows what has moved.
+//! * [`serving`]: how long a server takes to answer about small and vast rasters.
 //! * [`figure`]: a hallway's map as a picture.
 //! * [`evaluation`], [`speed`], [`statistics`], [`report`]: `mapfold-evaluate`, which writes tables between markers
 //!   into a page of text.
@@ -44,6 +45,7 @@ pub mod range;
 pub mod report;
 pub mod robot;
 pub mod server;
+pub mod serving;
 pub mod simulation;
 pub mod speed;
 pub mod statistics;

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use mapfold_tests::{change, evaluation, extraction, figure, growth, honesty, range, speed};
+use mapfold_tests::{
+    change, evaluation, extraction, figure, growth, honesty, range, serving, speed,
+};
 
 /// Measures Mapfold and rewrites the tables of a report between their markers.
 #[derive(Debug, Parser)]
@@ -57,6 +59,12 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         report: PathBuf,
     },
+    /// Uploads levels of up to 100 000 tiles and times what a server answers about their rasters
+    Serving {
+        /// The page with the markers `serving`
+        #[arg(long, value_name = "FILE")]
+        report: PathBuf,
+    },
     /// Draws a hallway's vector map from a few scans of the committed log
     Figure {
         /// The SVG to write
@@ -94,6 +102,7 @@ async fn main() -> ExitCode {
         Command::Growth { report, data } => growth::tables(&report, data.as_deref()),
         Command::Extraction { report, data } => extraction::extraction(&report, data.as_deref()),
         Command::Change { report } => change::table(&report),
+        Command::Serving { report } => serving::tables(&report).await,
         Command::Figure { out } => figure::write(&out).await.map(|()| Vec::new()),
         Command::Benches { report, criterion } => speed::benches(&report, &criterion),
     };

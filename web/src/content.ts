@@ -2,8 +2,8 @@
 // content in place: what did not change stays the same object, so that drawing can tell.
 
 import { boxAround, union, type Box } from "./geometry";
-import type { TileMark } from "./pyramid";
-import type { Chain, Cluster, RasterChanges, Segment, TileAddress, VectorPatch } from "./wire";
+import type { LayerTile, TileMark } from "./pyramid";
+import type { Chain, Cluster, RasterChanges, Segment, TilePlace, VectorPatch } from "./wire";
 
 /** Segments, clusters, chains and tiles of one level. */
 export interface Content {
@@ -32,7 +32,7 @@ export const NO_CONTENT: Content = {
 };
 
 /** A tile's name. */
-export function tileKey(tile: TileAddress): string {
+export function tileKey(tile: LayerTile): string {
   return `${tile.sensor}/${tile.x}/${tile.y}`;
 }
 
@@ -69,7 +69,9 @@ export function withVector(content: Content, patch: VectorPatch): Content {
 export function withRaster(content: Content, changes: RasterChanges): Content {
   const whole = changes.since === 0;
   if (!whole && changes.since !== content.rasterRevision) return content;
-  if (!whole && changes.tiles.length === 0 && changes.removed.length === 0) {
+  const gone = [...changes.removed, ...ofPrior(changes.removed_prior)];
+  const there = [...changes.tiles, ...ofPrior(changes.prior)];
+  if (!whole && there.length === 0 && gone.length === 0) {
     return { ...content, rasterRevision: changes.revision };
   }
   const tiles = new Map(content.tiles);
@@ -79,10 +81,10 @@ export function withRaster(content: Content, changes: RasterChanges): Content {
       tiles.set(key, { ...mark, revision: changes.revision, present: false });
     }
   }
-  for (const address of changes.removed) {
+  for (const address of gone) {
     tiles.set(tileKey(address), { address, revision: changes.revision, present: false });
   }
-  for (const address of changes.tiles) {
+  for (const address of there) {
     tiles.set(tileKey(address), { address, revision: changes.revision, present: true });
   }
   return {
@@ -93,10 +95,14 @@ export function withRaster(content: Content, changes: RasterChanges): Content {
   };
 }
 
-/** Tiles that hold evidence. */
+function ofPrior(places: readonly TilePlace[] | undefined): LayerTile[] {
+  return (places ?? []).map(({ x, y }) => ({ sensor: "prior", x, y }));
+}
+
+/** Tiles that hold evidence; the prior is none. */
 export function tileCount(content: Content): number {
   let count = 0;
-  for (const mark of content.tiles.values()) if (mark.present) count++;
+  for (const { present, address } of content.tiles.values()) if (present && address.sensor !== "prior") count++;
   return count;
 }
 

@@ -2,7 +2,7 @@
 // colleague the same picture. Also the way in for `#token=...`.
 
 import { DEFAULT_LAYERS, LAYER_NAMES, type Layers } from "./layers";
-import type { Evidence } from "./pyramid";
+import { EVIDENCE, type Evidence } from "./pyramid";
 
 /** One level of one site. */
 export interface Place {
@@ -22,8 +22,6 @@ export interface Permalink {
   layers: Layers;
   evidence: Evidence;
 }
-
-const EVIDENCE: readonly Evidence[] = ["all", "scanner", "sonar"];
 
 function finite(text: string | null): number | null {
   if (text === null || text.trim() === "") return null;

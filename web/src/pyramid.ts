@@ -3,7 +3,7 @@
 // to the right and rows DOWN from the level's origin; both may be negative.
 
 import type { Box } from "./geometry";
-import type { SensorClass, TileAddress } from "./wire";
+import type { SensorClass } from "./wire";
 
 /** Pixels along a picture's side. */
 export const PICTURE_PX = 256;
@@ -18,12 +18,25 @@ export interface PictureAddress {
   col: number;
 }
 
-/** Which sensors' evidence a picture shows. */
-export type Evidence = "all" | SensorClass;
+/** A layer of the raster: what sensors of one class saw, or the prior, which no robot saw. */
+export type LayerId = SensorClass | "prior";
+
+/** Which evidence a picture shows. */
+export type Evidence = "all" | LayerId;
+
+/** The choices of evidence, as permalinks and pictures name them. */
+export const EVIDENCE: readonly Evidence[] = ["all", "scanner", "sonar", "prior"];
+
+/** One layer's tile. */
+export interface LayerTile {
+  sensor: LayerId;
+  x: number;
+  y: number;
+}
 
 /** A tile as the page knows it: the revision of its last change, and whether it still holds evidence. */
 export interface TileMark {
-  address: TileAddress;
+  address: LayerTile;
   revision: number;
   present: boolean;
 }
@@ -75,7 +88,7 @@ export function picturesOver(box: Box, z: number, cellM: number): PictureAddress
 }
 
 /** The pictures at one zoom level that a tile lies in. */
-export function picturesTouched(tile: TileAddress, z: number, tileCells: number): PictureAddress[] {
+export function picturesTouched(tile: LayerTile, z: number, tileCells: number): PictureAddress[] {
   const pictureCells = PICTURE_PX * 2 ** (Z_CELL - z);
   const pictures: PictureAddress[] = [];
   const rowLast = Math.ceil((-tile.y * tileCells) / pictureCells) - 1;

@@ -18,6 +18,7 @@ export type SiteDescription = Wire["SiteDescription"];
 export type LevelDescription = Wire["LevelDescription"];
 export type LevelEvent = Wire["LevelEvent"];
 export type TileAddress = Wire["TileAddress"];
+export type TilePlace = Wire["TilePlace"];
 export type RasterChanges = Wire["RasterChanges"];
 export type Problem = Wire["Problem"];
 

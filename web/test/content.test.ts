@@ -83,6 +83,17 @@ describe("changes of tiles", () => {
     expect(whole.tiles.get("scanner/0/0")?.present).toBe(false);
   });
 
+  it("tell the prior apart from what robots saw, and from nothing", () => {
+    const before = rasterChanges(4, 5, { prior: [{ x: 0, y: 0 }, { x: 7, y: 7 }] });
+    const known = withRaster(first, before);
+    expect(known.tiles.get("prior/7/7")).toEqual({ address: { sensor: "prior", x: 7, y: 7 }, revision: 5, present: true });
+    expect(tileCount(known)).toBe(3);
+    expect(boundsOf(known, 3.2)?.[2]).toBeCloseTo(8 * 3.2);
+    const gone = withRaster(known, rasterChanges(5, 6, { removed_prior: [{ x: 7, y: 7 }] }));
+    expect(gone.tiles.get("prior/7/7")?.present).toBe(false);
+    expect(gone.tiles.get("scanner/0/0")?.revision).toBe(4);
+  });
+
   it("that start somewhere else are not applied", () => {
     expect(withRaster(first, rasterChanges(1, 9, { tiles: [tile(9, 9)] }))).toBe(first);
   });

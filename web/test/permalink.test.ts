@@ -1,6 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { DEFAULT_LAYERS } from "../src/layers";
 import { formatPermalink, parsePermalink, takeToken, type Permalink } from "../src/permalink";
+import { EVIDENCE } from "../src/pyramid";
 import { NO_LINK } from "./samples";
 
 describe("a permalink", () => {
@@ -35,7 +36,7 @@ describe("a permalink", () => {
     ["#x=1&y=2&resolution=-1", "the resolution is negative"],
     ["#x=1&y=2&resolution=Infinity", "the resolution is infinite"],
     ["#x=&y=2&resolution=1", "x is empty"],
-    ["#evidence=smell", "there is no such sensor"],
+    ["#evidence=smell", "there is no such layer"],
     ["#%E0%A4%A", "it is no text"],
   ])("takes %s as if that were not there: %s", (hash) => {
     expect(parsePermalink(hash)).toEqual(NO_LINK);
@@ -48,6 +49,11 @@ describe("a permalink", () => {
     expect(layers.grid).toEqual({ on: true, opacity: 0 });
     expect(layers.robots.on).toBe(false);
     expect(Object.keys(layers).sort()).toEqual(Object.keys(DEFAULT_LAYERS).sort());
+  });
+
+  it.each(EVIDENCE)("remembers that %s is shown", (evidence) => {
+    const link: Permalink = { ...NO_LINK, evidence };
+    expect(parsePermalink(formatPermalink(link))).toEqual(link);
   });
 
   it("can show no layer at all", () => {

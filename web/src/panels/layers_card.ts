@@ -2,21 +2,23 @@
 
 import { el, setShown } from "../dom";
 import { LAYER_NAMES, LAYER_TITLES, type LayerName } from "../layers";
-import type { Evidence } from "../pyramid";
+import { EVIDENCE, type Evidence } from "../pyramid";
 import type { State } from "../state";
 import type { Store } from "../store";
 
-const EVIDENCE: readonly { value: Evidence; title: string }[] = [
-  { value: "all", title: "all sensors" },
-  { value: "scanner", title: "scanners only" },
-  { value: "sonar", title: "sonar only" },
-];
+const TITLES: Readonly<Record<Evidence, string>> = {
+  all: "all layers",
+  scanner: "scanners only",
+  sonar: "sonar only",
+  prior: "prior only",
+};
 
 /** The shades of the server's pictures. */
 const SHADES = [
   { name: "free", title: "free" },
   { name: "occupied", title: "occupied" },
   { name: "sonar", title: "only by sonar" },
+  { name: "prior", title: "only in the prior" },
 ] as const;
 
 export function createLayersCard(parent: HTMLElement, store: Store): (state: State) => void {
@@ -25,20 +27,20 @@ export function createLayersCard(parent: HTMLElement, store: Store): (state: Sta
   const evidence = el(
     "select",
     {
-      attrs: { "aria-label": "Sensors whose evidence is shown" },
+      attrs: { "aria-label": "Evidence that is shown" },
       on: {
         change: () => {
-          const chosen = EVIDENCE.find(({ value }) => value === evidence.value);
-          if (chosen !== undefined) store.dispatch({ kind: "evidence", evidence: chosen.value });
+          const chosen = EVIDENCE.find((value) => value === evidence.value);
+          if (chosen !== undefined) store.dispatch({ kind: "evidence", evidence: chosen });
         },
       },
     },
-    ...EVIDENCE.map(({ value, title }) => el("option", { text: title, attrs: { value } })),
+    ...EVIDENCE.map((value) => el("option", { text: TITLES[value], attrs: { value } })),
   );
   const evidenceRow = el(
     "div",
     { class: "layer-options" },
-    el("div", {}, el("span", { text: "seen by" }), evidence),
+    el("div", {}, el("span", { text: "show" }), evidence),
     el(
       "div",
       { class: "shades" },

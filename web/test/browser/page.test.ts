@@ -243,7 +243,7 @@ describe("the operator", () => {
     await caughtUp();
     await page.uncheck("#layer-clusters");
     await page.locator("[aria-label='Opacity of Occupancy']").fill("40");
-    await page.selectOption("[aria-label='Sensors whose evidence is shown']", "sonar");
+    await page.selectOption("[aria-label='Evidence that is shown']", "sonar");
     await page.mouse.move(400, 400);
     await page.mouse.down();
     await page.mouse.move(300, 350, { steps: 5 });
