@@ -4,6 +4,7 @@
 mod args;
 mod backup;
 mod export;
+mod import;
 mod serve;
 mod token;
 mod verify;
@@ -67,6 +68,7 @@ async fn dispatch(arguments: Arguments) -> Result<ExitCode, CommandError> {
         Command::Serve => serve::run(config).await,
         Command::Token(command) => token::run(&config, command).await,
         Command::Export(command) => export::run(&config, &command).await,
+        Command::Import(command) => import::run(&config, &command).await,
         Command::Verify(command) => verify::run(&config, &command).await,
         Command::Backup(command) => backup::run(&config, &command).await,
     }

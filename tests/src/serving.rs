@@ -137,7 +137,7 @@ impl Asked {
 /// A file of the page: its style sheet, or the page where there is none.
 async fn file_of_page(api: &Api) -> Result<String, Error> {
     let page = api.get("/", "*/*").await?.expect(200)?.text();
-    let sheet = page.split('"').find(|word| word.ends_with(".css")).unwrap_or("/");
+    let sheet = page.split('"').find(|word| word.contains(".css")).unwrap_or("/");
     Ok(format!("/{}", sheet.trim_start_matches("./").trim_start_matches('/')))
 }
 

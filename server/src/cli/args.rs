@@ -59,6 +59,8 @@ pub(super) enum Command {
     Token(TokenCommand),
     /// Write a level's map as a file of another program
     Export(ExportCommand),
+    /// Make a map of another program the prior of a level, below what robots saw
+    Import(ImportCommand),
     /// Refold the log and compare it with what is stored; fails if anything differs
     Verify(VerifyCommand),
     /// Copy the whole embedded database, also while a server runs on it
@@ -135,6 +137,24 @@ pub(super) struct ExportCommand {
     pub(super) out: PathBuf,
     #[command(flatten)]
     pub(super) nav2: Nav2Options,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ImportCommand {
+    /// The YAML of a `map_server` map, with its image beside it; or a zip of both
+    pub(super) file: PathBuf,
+    /// Slug of the site
+    #[arg(long)]
+    pub(super) site: String,
+    /// Slug of the level
+    #[arg(long)]
+    pub(super) level: String,
+    /// How much the map is trusted, from 0 to 1 [default: 0.5]
+    #[arg(long)]
+    pub(super) trust: Option<f64>,
+    /// Only tell what is in it
+    #[arg(long)]
+    pub(super) preview: bool,
 }
 
 /// Of nav2 only: what is drawn, and how.

@@ -7,7 +7,6 @@ use axum::response::Response;
 use mapfold_schema::route;
 use mapfold_schema::v1::{Import, ImportPage, ImportReport};
 use serde::Deserialize;
-use sha2::{Digest, Sha256};
 
 use super::access::{Edit, LevelFor, Read};
 use super::answer::{Reader, blocking, created};
@@ -97,7 +96,7 @@ pub(super) async fn create(
         let tiles = tiles.map(|(at, tile)| Ok((*at, NewImport::column(tile)?)));
         Ok(NewImport {
             id,
-            digest: digest(&package, trust),
+            digest: package.digest(trust),
             author,
             at_us,
             tiles: if preview { Vec::new() } else { tiles.collect::<Result<_, ApiError>>()? },
@@ -162,18 +161,4 @@ pub(super) async fn remove(
     let removed = level.level.import(&new).await?;
     let name = || format!("{}/{}", level.level.site(), level.level.level());
     reader.small(&removed.ok_or_else(|| ApiError::not_found("prior", name()))?)
-}
-
-/// By what the same import is known.
-fn digest(package: &Package, trust: Trust) -> String {
-    use std::fmt::Write as _;
-    let mut digest = Sha256::new();
-    for part in [&package.description[..], &package.image, &trust.get().to_le_bytes()] {
-        digest.update((part.len() as u64).to_le_bytes());
-        digest.update(part);
-    }
-    digest.finalize().iter().fold(String::new(), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}"); // writing to a String cannot fail
-        text
-    })
 }

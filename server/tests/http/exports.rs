@@ -12,6 +12,7 @@ use mapfold_map::raster::{LogOdds, SensorClass, TILE_CELLS, Tile, TileIndex, Til
 use mapfold_map::vector::{Cluster, EndKind, Facing, Segment, SolidInterval};
 use mapfold_schema::geojson;
 use mapfold_schema::route;
+use mapfold_schema::v1::Import;
 use mapfold_server::exchange::nav2::{Content, Description, Image, Nav2Map, Style, load};
 use reqwest::header::IF_NONE_MATCH;
 
@@ -226,4 +227,44 @@ async fn a_map_without_evidence_has_no_image_and_an_unknown_format_is_none() {
     let empty = server.admin().get(&path("geojson")).await.expect(200);
     let empty: serde_json::Value = serde_json::from_slice(&empty.body).unwrap();
     assert_eq!(empty["features"], serde_json::json!([]));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_export_comes_back_as_a_prior_on_the_command_line_as_over_http() {
+    let server = Server::start().await;
+    let floor = Level::create(&server.admin()).await;
+    floor.contribute("r1", 1).await;
+    let nav2 = floor.path(route::EXPORTS).replace("{format}", "nav2");
+    let zip = server.admin().get(&nav2).await.expect(200).body;
+    let path = floor.path(route::IMPORTS);
+    let answer = server.admin().post_bytes(&path, "application/zip", zip).await;
+    let imported: Import = answer.expect(201).data();
+    floor.folded(2).await;
+    let of_prior = server.admin().get(&format!("{nav2}?layer=prior")).await.expect(200).body;
+    let seen =
+        unzipped(&server.admin().get(&format!("{nav2}?layer=scanner")).await.expect(200).body);
+    // At a trust of a half a free cell says too little to be written as free again.
+    let occupied = |files: &BTreeMap<String, Vec<u8>>| -> Vec<bool> {
+        files["map.pgm"].iter().rev().take(64 * 64).map(|grey| *grey == 0).collect()
+    };
+    assert!(occupied(&seen).contains(&true));
+    assert_eq!(occupied(&unzipped(&of_prior)), occupied(&seen));
+
+    let folder = server.shutdown().await;
+    let yaml = exported_with(folder.path(), "nav2", "prior.yaml", &["--layer", "scanner"]);
+    let import = |more: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_mapfold-server"));
+        command.arg("import").arg(&yaml).args(["--site", "plant", "--level", "floor"]);
+        command.arg("--data-dir").arg(folder.path().join("data")).args(more);
+        let output = command.output().unwrap();
+        (output.status.success(), String::from_utf8(output.stdout).unwrap())
+    };
+    let (done, told) = import(&["--preview"]);
+    let report = imported.report.unwrap();
+    assert!(done && told.contains(&format!("{} occupied", report.occupied)), "{told}");
+    assert!(!told.contains("revision"), "{told}");
+    let (done, told) = import(&["--trust", "1"]);
+    assert!(done && told.contains("since revision 3"), "{told}");
+    assert!(import(&["--trust", "1"]).1.contains("since revision 3"));
+    assert!(!import(&["--trust", "2"]).0);
 }

@@ -5,6 +5,7 @@ use std::io::{Cursor, Read};
 
 use mapfold_map::raster::{TILE_SIDE, TileIndex};
 use mapfold_schema::v1::{Bounds, ImportReport};
+use sha2::{Digest, Sha256};
 use zip::ZipArchive;
 
 use super::cells::load;
@@ -83,6 +84,20 @@ impl Package {
             return Err(ImportError::ImageTooLong { max: IMAGE_BYTES_MAX });
         }
         Ok(Self { description, image })
+    }
+
+    /// SHA-256 of the files and the trust, lower-case hexadecimal: by this the same import is known.
+    pub fn digest(&self, trust: Trust) -> String {
+        use std::fmt::Write as _;
+        let mut digest = Sha256::new();
+        for part in [&self.description[..], &self.image, &trust.get().to_le_bytes()] {
+            digest.update((part.len() as u64).to_le_bytes());
+            digest.update(part);
+        }
+        digest.finalize().iter().fold(String::new(), |mut text, byte| {
+            let _ = write!(text, "{byte:02x}"); // writing to a String cannot fail
+            text
+        })
     }
 
     /// Puts the map on a grid of `resolution_m`.
