@@ -25,7 +25,7 @@ use crate::{Error, report};
 
 /// Tiles of the levels.
 const SIZES: [i32; 3] = [1_000, 10_000, 100_000];
-/// Tiles along a row of the largest level, so that one picture of zoom level 0 is full.
+/// Tiles along a column of the largest level, so that one picture of zoom level 0 is full.
 const ROW: i32 = 316;
 /// Tiles of a contribution, and of one that changes a little.
 const LOOK: i32 = 1_000;
@@ -56,7 +56,7 @@ impl Place {
         let frame = level.describe().await?.frame;
         let token = api.with_token(&token);
         let mut place = Self { level, frame, token, looks: 0, turn: 0 };
-        let all: Vec<(i32, i32)> = (0..tiles).map(|n| (n % ROW, n / ROW)).collect();
+        let all: Vec<(i32, i32)> = (0..tiles).map(|n| (n / ROW, n % ROW)).collect();
         for look in all.chunks(LOOK as usize) {
             place.upload(look).await?;
         }
@@ -105,7 +105,7 @@ impl Place {
     fn somewhere(&mut self, tiles: i32) -> (i32, i32) {
         self.turn += 1;
         let at = (self.turn.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 33) as i32 % tiles;
-        (at % ROW, at / ROW)
+        (at / ROW, at % ROW)
     }
 }
 
@@ -174,7 +174,7 @@ async fn lists(
 ) -> Result<(String, Vec<String>), Error> {
     let mut paths = Vec::new();
     for (place, tiles) in places.iter_mut().zip(SIZES) {
-        let some: Vec<(i32, i32)> = (0..CHANGE).map(|n| (n, tiles / ROW / 2)).collect();
+        let some: Vec<(i32, i32)> = (0..CHANGE).map(|n| (tiles / ROW / 2, n)).collect();
         place.upload(&some).await?;
         let last = place.level.folded().await?.folded_revision;
         let path = format!("{}?since={}", place.level.path(route::RASTER), last - 1);

@@ -107,14 +107,25 @@ impl Address {
 
     /// The picture's pixels from the shades of its tiles.
     fn pixels<'a>(self, tiles: impl IntoIterator<Item = (TileIndex, &'a Shades)>) -> Vec<u8> {
+        let side = self.block().min(TILE_SIDE);
+        self.paste_all(tiles.into_iter().map(|(tile, shades)| (tile, shades.at_side(side))))
+    }
+
+    /// Pixels along a tile's side in this picture.
+    fn block(self) -> usize {
+        PICTURE_SIDE >> (ZOOM_MAX - self.z)
+    }
+
+    /// The picture's pixels from those of its tiles, at the size that they have in it (or as cells).
+    fn paste_all<T: AsRef<[u8]>>(self, tiles: impl IntoIterator<Item = (TileIndex, T)>) -> Vec<u8> {
         let mut pixels = vec![0_u8; PICTURE_PIXELS];
-        let block = PICTURE_SIDE >> (ZOOM_MAX - self.z);
+        let block = self.block();
         if let Some((xs, ys)) = self.tiles() {
             for (tile, shades) in tiles {
                 if xs.contains(&tile.x) && ys.contains(&tile.y) {
                     let left = tile.x.abs_diff(*xs.start()) as usize * block;
                     let top = ys.end().abs_diff(tile.y) as usize * block;
-                    paste(&mut pixels, left, top, block, shades);
+                    paste(&mut pixels, left, top, block, shades.as_ref());
                 }
             }
         }
@@ -123,15 +134,14 @@ impl Address {
 }
 
 /// Copies a tile into a block of the picture, upside down as a picture's rows run downwards.
-fn paste(pixels: &mut [u8], left: usize, top: usize, block: usize, shades: &Shades) {
+fn paste(pixels: &mut [u8], left: usize, top: usize, block: usize, shades: &[u8]) {
     let side = block.min(TILE_SIDE);
     let magnified = block / side;
-    let level = shades.at_side(side);
     for down in 0..block {
         let row = side - 1 - down / magnified;
         let start = (top + down) * PICTURE_SIDE + left;
         for (across, pixel) in pixels[start..start + block].iter_mut().enumerate() {
-            *pixel = level[row * side + across / magnified];
+            *pixel = shades[row * side + across / magnified];
         }
     }
 }

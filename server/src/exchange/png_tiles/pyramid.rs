@@ -149,10 +149,9 @@ impl<R: Dated> Drawing<'_, R> {
         let shades = tiles.iter().map(|(tile, layers)| {
             let plain: Vec<(LayerId, &Tile)> =
                 layers.iter().map(|(layer, tile)| (*layer, tile.as_ref())).collect();
-            (*tile, self.shading.shade(&plain))
+            (*tile, self.shading.shade_coarsely(&plain))
         });
-        let shades: Vec<_> = shades.collect();
-        Some(address.pixels(shades.iter().map(|(tile, shades)| (*tile, shades))))
+        Some(address.paste_all(shades))
     }
 
     /// A picture as part of a coarser one.

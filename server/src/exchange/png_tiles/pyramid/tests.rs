@@ -2,6 +2,7 @@
 
 use mapfold_map::raster::{Cell, SensorClass, TILE_CELLS, TileIndex, TileKey};
 
+use super::super::shades::COARSE_SIDE;
 use super::super::tests::{World, map_of};
 use super::super::{Shades, ZOOM_MAX};
 use super::*;
@@ -17,6 +18,34 @@ fn scattered(count: u64) -> impl Iterator<Item = [i32; 3]> {
         };
         [mix(0) % 12_000 - 6000, mix(1) % 12_000 - 6000, mix(2) % 1200 - 600]
     })
+}
+
+#[test]
+fn tiles_are_shaded_coarsely_as_they_are_shaded_finely() {
+    let shading = Shading::default();
+    let tile = |salt: u64, sparse: i32| {
+        let mut cells = Box::new([0; TILE_CELLS]);
+        for (cell, [a, b, value]) in
+            cells.iter_mut().zip(scattered(TILE_CELLS as u64 + salt).skip(salt as usize))
+        {
+            *cell = if (a ^ b) % sparse == 0 { value } else { 0 };
+        }
+        Tile::new(cells)
+    };
+    for salt in 0..60 {
+        let sparse = 1 + (salt % 12) as i32 * 3;
+        let (a, b) = (tile(salt, sparse), tile(salt + 5000, 2 * sparse));
+        for ids in [&LayerId::ALL[..1], &LayerId::ALL[1..2], &LayerId::ALL[2..], &LayerId::ALL[..2]]
+        {
+            let layers: Vec<(LayerId, &Tile)> = ids.iter().copied().zip([&a, &b]).collect();
+            let fine = shading.shade(&layers);
+            assert_eq!(
+                fine.at_side(COARSE_SIDE),
+                shading.shade_coarsely(&layers),
+                "{ids:?}, {salt}"
+            );
+        }
+    }
 }
 
 fn world() -> World {
