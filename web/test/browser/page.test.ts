@@ -243,7 +243,11 @@ describe("the operator", () => {
     await caughtUp();
     await page.uncheck("#layer-clusters");
     await page.locator("[aria-label='Opacity of Occupancy']").fill("40");
-    await page.selectOption("[aria-label='Evidence that is shown']", "sonar");
+    const evidence = "[aria-label='Evidence that is shown']";
+    const offered = await page.locator(`${evidence} option`).allTextContents();
+    expect(offered).toEqual(["all layers", "scanners only", "sonar only", "prior only"]);
+    expect(await page.textContent(".shades")).toContain("only in the prior");
+    await page.selectOption(evidence, "sonar");
     await page.mouse.move(400, 400);
     await page.mouse.down();
     await page.mouse.move(300, 350, { steps: 5 });
