@@ -62,10 +62,12 @@
 //! * [`geometry`]: angles, covariances, poses, supporting lines, intervals, hulls.
 //! * [`vector`]: observed segments and clusters, and the walls they fuse into.
 //! * [`raster`]: integer log-odds evidence and the tiles it adds up in.
+//! * [`gdb`]: the building as it was meant to be, cut to what a sensor would see of it.
 //! * [`level`]: contributions, the fold, and patches between two revisions.
 
 #[cfg(test)]
 mod chance;
+pub mod gdb;
 pub mod geometry;
 pub mod level;
 pub mod raster;

@@ -50,6 +50,7 @@ const MODULES: &[(&str, &[ModuleRule])] = &[
             ("chance", &[]),
             ("geometry", &[]),
             ("raster", &["chance", "geometry"]),
+            ("gdb", &["geometry", "raster"]),
             // Features bear the identities that contributions give them; of the fold they know nothing.
             (
                 "vector",
