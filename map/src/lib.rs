@@ -69,6 +69,7 @@
 mod chance;
 pub mod gdb;
 pub mod geometry;
+pub mod landmarks;
 pub mod level;
 pub mod raster;
 pub mod vector;

@@ -1,0 +1,371 @@
+//! Where a robot is, from the landmarks that it sees, with nothing else known or with a guess.
+//!
+//! Pairs of what is seen, rare ones first, are looked up in the table; each pair of the table that could be
+//! the same gives a pose; a pose is grown to all that it explains and refined. Poses are then weighed
+//! against each other and against "none of them": what was seen where the table says, what was seen and is
+//! not there (clutter), and what should have been seen and was not. To first order in the pose's
+//! covariance (Laplace), the weight of a pose is
+//!
+//! `sum_matched ln(P_D N(e; C)) + sum_unmatched ln c + sum_missed ln(1 - P_D) + ln(prior sqrt(|2 pi C_pose|))`
+//!
+//! with `c` the density of clutter over place, direction and kind. Counting matches alone would call two
+//! equal rooms different for one chance match.
+
+use std::f64::consts::{PI, TAU};
+
+use super::hypothesis::{Hypothesis, Match, Search, Seed, is_near};
+use super::pairs::Shape;
+use super::sight::{Obstacles, Sight};
+use super::table::{PAIR_LENGTHS, PAIR_SD_MAX};
+use super::{LandmarkKind, LandmarkTable, ObservedLandmark};
+use crate::geometry::{Covariance, Level, Robot, UncertainPose, difference, mahalanobis_sq};
+
+/// When poses count as found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LocateConfig {
+    /// Most pairs of what is seen that are looked up.
+    pub seeds_max: usize,
+    /// Most of them that one landmark is an end of, so that no single one (which may be clutter) rules.
+    pub seeds_per_landmark: usize,
+    /// Most poses that are tried; with more of them nothing can be told.
+    pub tries_max: usize,
+    /// Fewest landmarks that a pose explains.
+    pub matches_min: usize,
+    /// Squared deviations within which a landmark is where it should be: the 99 % quantile of chi-square
+    /// with two degrees of freedom.
+    pub gate: f64,
+    /// Directions are not known better than this, radians.
+    pub direction_sd_min: f64,
+    /// Least density of landmarks seen that are none, a square metre.
+    pub clutter: f64,
+    /// Probability that a landmark in full sight is seen: corners and free ends.
+    pub detection: f64,
+    /// The same of doorways, whose doors may be closed.
+    pub detection_of_doorways: f64,
+    /// The same of all where nobody says what stands in the way.
+    pub detection_in_the_dark: f64,
+    /// Logarithm of how much likelier one pose must be than all others together.
+    pub odds: f64,
+    /// Poses closer than this are one: metres, radians.
+    pub apart: (f64, f64),
+    /// Headings less certain than this are none, radians.
+    pub heading_sd_max: f64,
+    /// Most candidates that are told.
+    pub candidates_max: usize,
+}
+
+impl LocateConfig {
+    /// The defaults: a thousand to one.
+    pub const STANDARD: Self = Self {
+        seeds_max: 16,
+        seeds_per_landmark: 6,
+        tries_max: 200_000,
+        matches_min: 3,
+        gate: 9.21,
+        direction_sd_min: 3.0 * PI / 180.0,
+        clutter: 0.02,
+        detection: 0.9,
+        detection_of_doorways: 0.5,
+        detection_in_the_dark: 0.5,
+        odds: 6.9,
+        apart: (0.5, 0.3),
+        heading_sd_max: 3.0 * PI / 180.0,
+        candidates_max: 16,
+    };
+}
+
+const KINDS: usize = LandmarkKind::ALL.len();
+
+/// A pose that may be the robot's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// The pose.
+    pub level_from_robot: UncertainPose<Level, Robot>,
+    /// What was seen (by place in the list) and the landmark that it is (by number in the table), ascending.
+    pub matches: Vec<(usize, u32)>,
+    /// Chi-square of the matches, with `2 n - 3` degrees of freedom.
+    pub chi_sq: f64,
+    /// Its share of all poses' probability.
+    pub weight: f64,
+}
+
+/// Where a robot is, as far as can be told.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Fix {
+    /// There; all other places together are less likely by the odds asked for.
+    Unique(Candidate),
+    /// One of these, likeliest first, or elsewhere.
+    Ambiguous(Vec<Candidate>),
+    /// Nothing that is seen fits well enough.
+    NoMatch,
+}
+
+/// Finds where a robot is that sees these landmarks. `sight` is what its sensor covers, `obstacles` what may stand
+/// in the way of it, if that is known, `prior` a guess of the pose.
+pub fn locate(
+    table: &LandmarkTable,
+    seen: &[ObservedLandmark],
+    sight: &Sight,
+    obstacles: Option<&Obstacles>,
+    prior: Option<&UncertainPose<Level, Robot>>,
+    config: &LocateConfig,
+) -> Fix {
+    let search = Search { table, seen, config };
+    let weigh = Weigh { search, sight, obstacles, prior, clutter: clutter(seen, sight, config) };
+    let Some(hypotheses) = hypotheses(&search, prior) else { return Fix::Ambiguous(Vec::new()) };
+    weigh.decide(hypotheses)
+}
+
+/// The pairs to look up, rare ones first.
+fn seeds(search: &Search<'_>) -> Vec<(Seed, Shape)> {
+    let Search { table, seen, config } = *search;
+    let fit: Vec<usize> = (0..seen.len()).filter(|i| seen[*i].place_sd() <= PAIR_SD_MAX).collect();
+    let mut all: Vec<(usize, Seed, Shape)> = Vec::new();
+    for (from, i) in fit.iter().enumerate() {
+        for j in &fit[from + 1..] {
+            let shape = Shape::of(&seen[*i], &seen[*j]);
+            if shape.length >= PAIR_LENGTHS.0 && shape.length <= PAIR_LENGTHS.1 {
+                let seed = Seed { ends: [*i, *j], length: shape.length };
+                let population = table.pairs.population(&shape, length_gate(search, &seed));
+                if population > 0 {
+                    all.push((population, seed, shape));
+                }
+            }
+        }
+    }
+    // Of equally rare ones the longer, which tells a better heading.
+    all.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.length.total_cmp(&a.1.length)));
+    let mut uses = vec![0; seen.len()];
+    all.retain(|(_, seed, _)| {
+        let is_used = seed.ends.iter().any(|end| uses[*end] >= config.seeds_per_landmark);
+        if !is_used {
+            seed.ends.iter().for_each(|end| uses[*end] += 1);
+        }
+        !is_used
+    });
+    all.truncate(config.seeds_max);
+    all.into_iter().map(|(_, seed, shape)| (seed, shape)).collect()
+}
+
+/// How far the length of a pair seen may be from the table's: three deviations.
+fn length_gate(search: &Search<'_>, seed: &Seed) -> f64 {
+    let [i, j] = seed.ends;
+    3.0 * search.place_sd(i).hypot(search.place_sd(j))
+}
+
+/// All poses that explain enough; `None` if there are too many to try.
+fn hypotheses(
+    search: &Search<'_>,
+    prior: Option<&UncertainPose<Level, Robot>>,
+) -> Option<Vec<Hypothesis>> {
+    let Search { table, seen, config } = *search;
+    let mut found: Vec<Hypothesis> = Vec::new();
+    let mut tries = 0;
+    for (seed, shape) in seeds(search) {
+        let gate = length_gate(search, &seed);
+        let direction_sd = seed
+            .ends
+            .map(|end| search.direction_sd(&seen[end], table.worst.1))
+            .into_iter()
+            .fold(0.0, f64::max);
+        let turn_gate = 3.0 * direction_sd.hypot(gate / (3.0 * shape.length));
+        table.pairs.alike(&shape, gate, turn_gate, |known| {
+            tries += 1;
+            if tries > config.tries_max {
+                return;
+            }
+            let pose = search.pose_of(&seed, known);
+            let is_far = prior.is_some_and(|prior| {
+                // Far outside of what the guess and the seed allow together.
+                let arm = nalgebra::Vector3::new(
+                    pose.x - prior.pose.x,
+                    pose.y - prior.pose.y,
+                    difference(pose.heading(), prior.pose.heading()),
+                );
+                let slack = Covariance::from_variances([0.25, 0.25, 0.03]);
+                mahalanobis_sq(&arm, &(prior.covariance + slack)) > 25.0
+            });
+            let pair = [(seed.ends[0], known[0]), (seed.ends[1], known[1])];
+            let is_known = |h: &Hypothesis| pair.iter().all(|m| h.matches.binary_search(m).is_ok());
+            if is_far || found.iter().any(is_known) {
+                return;
+            }
+            if let Some(hypothesis) = search.grow(&seed, known) {
+                found.push(hypothesis);
+            }
+        });
+    }
+    (tries <= config.tries_max).then_some(found)
+}
+
+/// Logarithm of the density of clutter over place, direction and kind, by kind: what the configuration says, or
+/// as if all that is seen were clutter. A cluttered place must not look like a known one by chance.
+fn clutter(seen: &[ObservedLandmark], sight: &Sight, config: &LocateConfig) -> [f64; KINDS] {
+    let farthest = seen.iter().map(|l| l.at.norm()).fold(sight.range, f64::max);
+    let area = (sight.half_field * farthest * farthest).max(1.0);
+    LandmarkKind::ALL.map(|kind| {
+        let count = seen.iter().filter(|l| l.kind == kind).count() as f64;
+        let density = (config.clutter / KINDS as f64).max(count / area);
+        let turn = if kind.is_two_sided() { PI } else { TAU };
+        (density / turn).ln()
+    })
+}
+
+/// What weighs poses against each other.
+struct Weigh<'a> {
+    search: Search<'a>,
+    sight: &'a Sight,
+    obstacles: Option<&'a Obstacles>,
+    prior: Option<&'a UncertainPose<Level, Robot>>,
+    clutter: [f64; KINDS],
+}
+
+impl Weigh<'_> {
+    fn decide(&self, hypotheses: Vec<Hypothesis>) -> Fix {
+        let config = self.search.config;
+        // Without what was missed, which only lessens a weight: the likeliest are looked at first.
+        let mut bounded: Vec<(f64, Hypothesis)> =
+            hypotheses.into_iter().map(|h| (self.of_seen(&h), h)).collect();
+        bounded.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| order(&a.1, &b.1)));
+        let mut weighed: Vec<(f64, Hypothesis)> = Vec::new();
+        let mut best = f64::NEG_INFINITY;
+        for (bound, hypothesis) in bounded {
+            // All that follow together weigh less than a hundredth of what would matter.
+            if bound < best - config.odds - 10.0 {
+                break;
+            }
+            let pose = hypothesis.fit.level_from_robot.pose;
+            let is_known = |(_, other): &(f64, Hypothesis)| {
+                is_near(&other.fit.level_from_robot.pose, &pose, config.apart)
+            };
+            let weight = bound + self.of_missed(&hypothesis);
+            best = best.max(weight);
+            match weighed.iter_mut().find(|known| is_known(known)) {
+                Some(known) if known.0 < weight => *known = (weight, hypothesis),
+                Some(_) => {}
+                None => weighed.push((weight, hypothesis)),
+            }
+        }
+        weighed.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| order(&a.1, &b.1)));
+        let nowhere = self.search.seen.iter().map(|l| self.of_clutter(l.kind)).sum::<f64>();
+        let first = weighed.first();
+        let first = first.map(|(best, h)| (*best, h.fit.level_from_robot.covariance.sd(2)));
+        let Some((best, heading_sd)) = first else { return Fix::NoMatch };
+        if best - nowhere <= config.odds {
+            return Fix::NoMatch;
+        }
+        let share = |weight: f64| (weight - best).exp();
+        let total: f64 = weighed.iter().map(|(weight, _)| share(*weight)).sum();
+        let others = total - 1.0;
+        let is_unique = others.ln() < -config.odds && heading_sd <= config.heading_sd_max;
+        let candidates = weighed.into_iter().take(config.candidates_max);
+        let mut candidates = candidates.map(|(weight, hypothesis)| Candidate {
+            level_from_robot: hypothesis.fit.level_from_robot,
+            matches: hypothesis.matches,
+            chi_sq: hypothesis.fit.chi_sq,
+            weight: share(weight) / total,
+        });
+        match candidates.next() {
+            Some(candidate) if is_unique => Fix::Unique(candidate),
+            first => Fix::Ambiguous(first.into_iter().chain(candidates).collect()),
+        }
+    }
+
+    /// What was seen, and the guess.
+    fn of_seen(&self, hypothesis: &Hypothesis) -> f64 {
+        let Search { table, seen, .. } = self.search;
+        let UncertainPose { pose, covariance } = &hypothesis.fit.level_from_robot;
+        let mut weight = 0.0;
+        let mut matches = hypothesis.matches.iter().peekable();
+        for (k, landmark) in seen.iter().enumerate() {
+            let Some((_, number)) = matches.next_if(|(seen, _)| *seen == k) else {
+                weight += self.of_clutter(landmark.kind);
+                continue;
+            };
+            let known = &table.landmarks[*number as usize];
+            let (residual, place) = self.search.pair((k, *number)).residual(pose);
+            let turn = landmark.kind.turn(known.direction, landmark.direction + pose.heading());
+            let sd = self.search.direction_sd(landmark, known.direction_sd);
+            weight += self.detection(landmark.kind).ln() + ln_normal(&residual, &place)
+                - 0.5 * (turn / sd).powi(2)
+                - (sd * TAU.sqrt()).ln();
+        }
+        let prior = match self.prior {
+            Some(prior) => {
+                let off = nalgebra::Vector3::new(
+                    pose.x - prior.pose.x,
+                    pose.y - prior.pose.y,
+                    difference(pose.heading(), prior.pose.heading()),
+                );
+                ln_normal(&off, &(prior.covariance + *covariance))
+            }
+            None => -(table.area * TAU).ln(),
+        };
+        weight + prior + 0.5 * (TAU.powi(3) * covariance.matrix().determinant()).ln()
+    }
+
+    /// What should have been seen and was not.
+    fn of_missed(&self, hypothesis: &Hypothesis) -> f64 {
+        let table = self.search.table;
+        let pose = &hypothesis.fit.level_from_robot.pose;
+        let is_matched =
+            |number: u32| hypothesis.matches.iter().any(|(_, known): &Match| *known == number);
+        let should_be_seen = |number: &u32| {
+            let landmark = &table.landmarks[*number as usize];
+            !is_matched(*number)
+                && self.sight.covers(pose, landmark)
+                && self.obstacles.is_none_or(|o| o.leave_free(&pose.position(), landmark))
+        };
+        let near = table.grid.near(&pose.position(), self.sight.range);
+        near.filter(should_be_seen)
+            .map(|number| (1.0 - self.detection(table.landmarks[number as usize].kind)).ln())
+            .sum()
+    }
+
+    fn detection(&self, kind: LandmarkKind) -> f64 {
+        let config = self.search.config;
+        if self.obstacles.is_none() {
+            config.detection_in_the_dark
+        } else if kind == LandmarkKind::Doorway {
+            config.detection_of_doorways
+        } else {
+            config.detection
+        }
+    }
+
+    fn of_clutter(&self, kind: LandmarkKind) -> f64 {
+        self.clutter[kind as usize]
+    }
+}
+
+/// Logarithm of a normal density.
+fn ln_normal<const N: usize>(off: &nalgebra::SVector<f64, N>, covariance: &Covariance<N>) -> f64
+where
+    Covariance<N>: Determinant,
+{
+    -0.5 * mahalanobis_sq(off, covariance)
+        - 0.5 * (TAU.powi(N as i32) * covariance.determinant()).ln()
+}
+
+/// Determinants of the sizes that are used.
+trait Determinant {
+    fn determinant(&self) -> f64;
+}
+
+impl Determinant for Covariance<2> {
+    fn determinant(&self) -> f64 {
+        self.matrix().determinant()
+    }
+}
+
+impl Determinant for Covariance<3> {
+    fn determinant(&self) -> f64 {
+        self.matrix().determinant()
+    }
+}
+
+/// An order that does not depend on how hypotheses were found.
+fn order(a: &Hypothesis, b: &Hypothesis) -> std::cmp::Ordering {
+    let known = |h: &Hypothesis| -> Vec<u32> { h.matches.iter().map(|m| m.1).collect() };
+    known(a).cmp(&known(b))
+}
