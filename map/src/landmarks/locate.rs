@@ -13,20 +13,20 @@
 
 use std::f64::consts::{PI, TAU};
 
+use nalgebra::{SVector, Vector3};
+
 use super::hypothesis::{Hypothesis, Match, Search, Seed, is_near};
 use super::pairs::Shape;
 use super::sight::{Obstacles, Sight};
 use super::table::{PAIR_LENGTHS, PAIR_SD_MAX};
 use super::{LandmarkKind, LandmarkTable, ObservedLandmark};
-use crate::geometry::{Covariance, Level, Robot, UncertainPose, difference, mahalanobis_sq};
+use crate::geometry::{Covariance, Level, Pose, Robot, UncertainPose, difference, mahalanobis_sq};
 
 /// When poses count as found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocateConfig {
     /// Most pairs of what is seen that are looked up.
     pub seeds_max: usize,
-    /// Most of them that one landmark is an end of, so that no single one (which may be clutter) rules.
-    pub seeds_per_landmark: usize,
     /// Most poses that are tried; with more of them nothing can be told.
     pub tries_max: usize,
     /// Fewest landmarks that a pose explains.
@@ -57,8 +57,7 @@ pub struct LocateConfig {
 impl LocateConfig {
     /// The defaults: a thousand to one.
     pub const STANDARD: Self = Self {
-        seeds_max: 16,
-        seeds_per_landmark: 6,
+        seeds_max: 24,
         tries_max: 200_000,
         matches_min: 3,
         gate: 9.21,
@@ -116,86 +115,114 @@ pub fn locate(
     weigh.decide(hypotheses)
 }
 
-/// The pairs to look up, rare ones first.
-fn seeds(search: &Search<'_>) -> Vec<(Seed, Shape)> {
+/// A pair to look up: how far its length and its directions may be off.
+struct Query {
+    seed: Seed,
+    shape: Shape,
+    /// Metres: three deviations.
+    gate: f64,
+    /// Radians.
+    turn_gate: f64,
+    population: usize,
+}
+
+/// The pairs to look up: those of landmarks that have been used least, of these the rarest first.
+fn queries(search: &Search<'_>) -> Vec<Query> {
     let Search { table, seen, config } = *search;
     let fit: Vec<usize> = (0..seen.len()).filter(|i| seen[*i].place_sd() <= PAIR_SD_MAX).collect();
-    let mut all: Vec<(usize, Seed, Shape)> = Vec::new();
+    let mut all: Vec<Query> = Vec::new();
     for (from, i) in fit.iter().enumerate() {
         for j in &fit[from + 1..] {
             let shape = Shape::of(&seen[*i], &seen[*j]);
-            if shape.length >= PAIR_LENGTHS.0 && shape.length <= PAIR_LENGTHS.1 {
-                let seed = Seed { ends: [*i, *j], length: shape.length };
-                let population = table.pairs.population(&shape, length_gate(search, &seed));
-                if population > 0 {
-                    all.push((population, seed, shape));
-                }
+            if shape.length < PAIR_LENGTHS.0 || shape.length > PAIR_LENGTHS.1 {
+                continue;
             }
+            let gate = 3.0 * search.place_sd(*i).hypot(search.place_sd(*j));
+            let direction_sd = |end: usize| search.direction_sd(&seen[end], table.worst.1);
+            let direction_sd = direction_sd(*i).max(direction_sd(*j));
+            let turn_gate = 3.0 * direction_sd.hypot(gate / (3.0 * shape.length));
+            let population = table.pairs.population(&shape, gate, turn_gate);
+            let seed = Seed { ends: [*i, *j], length: shape.length };
+            all.push(Query { seed, shape, gate, turn_gate, population });
         }
     }
     // Of equally rare ones the longer, which tells a better heading.
-    all.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.length.total_cmp(&a.1.length)));
-    let mut uses = vec![0; seen.len()];
-    all.retain(|(_, seed, _)| {
-        let is_used = seed.ends.iter().any(|end| uses[*end] >= config.seeds_per_landmark);
-        if !is_used {
-            seed.ends.iter().for_each(|end| uses[*end] += 1);
-        }
-        !is_used
-    });
-    all.truncate(config.seeds_max);
-    all.into_iter().map(|(_, seed, shape)| (seed, shape)).collect()
-}
-
-/// How far the length of a pair seen may be from the table's: three deviations.
-fn length_gate(search: &Search<'_>, seed: &Seed) -> f64 {
-    let [i, j] = seed.ends;
-    3.0 * search.place_sd(i).hypot(search.place_sd(j))
+    let rarity = |a: &Query, b: &Query| {
+        a.population.cmp(&b.population).then(b.shape.length.total_cmp(&a.shape.length))
+    };
+    all.sort_by(rarity);
+    let mut uses = vec![0_usize; seen.len()];
+    let mut chosen = Vec::new();
+    while chosen.len() < config.seeds_max {
+        let worn = |query: &Query| query.seed.ends.iter().map(|end| uses[*end]).sum::<usize>();
+        let Some(next) = (0..all.len()).min_by_key(|at| worn(&all[*at])) else { break };
+        let query = all.remove(next);
+        query.seed.ends.iter().for_each(|end| uses[*end] += 1);
+        chosen.push(query);
+    }
+    chosen
 }
 
 /// All poses that explain enough; `None` if there are too many to try.
+///
+/// Ends early when no pose can have been overlooked that explains as many landmarks as the best, or one
+/// less: whichever those are, both ends of some pair that was looked up are among them.
 fn hypotheses(
     search: &Search<'_>,
     prior: Option<&UncertainPose<Level, Robot>>,
 ) -> Option<Vec<Hypothesis>> {
     let Search { table, seen, config } = *search;
     let mut found: Vec<Hypothesis> = Vec::new();
-    let mut tries = 0;
-    for (seed, shape) in seeds(search) {
-        let gate = length_gate(search, &seed);
-        let direction_sd = seed
-            .ends
-            .map(|end| search.direction_sd(&seen[end], table.worst.1))
-            .into_iter()
-            .fold(0.0, f64::max);
-        let turn_gate = 3.0 * direction_sd.hypot(gate / (3.0 * shape.length));
+    let (mut tries, mut most) = (0, 0);
+    let mut asked: Vec<[usize; 2]> = Vec::new();
+    for Query { seed, shape, gate, turn_gate, .. } in queries(search) {
         table.pairs.alike(&shape, gate, turn_gate, |known| {
             tries += 1;
             if tries > config.tries_max {
                 return;
             }
-            let pose = search.pose_of(&seed, known);
-            let is_far = prior.is_some_and(|prior| {
-                // Far outside of what the guess and the seed allow together.
-                let arm = nalgebra::Vector3::new(
-                    pose.x - prior.pose.x,
-                    pose.y - prior.pose.y,
-                    difference(pose.heading(), prior.pose.heading()),
-                );
-                let slack = Covariance::from_variances([0.25, 0.25, 0.03]);
-                mahalanobis_sq(&arm, &(prior.covariance + slack)) > 25.0
-            });
+            let is_far = prior.is_some_and(|prior| is_far(prior, &search.pose_of(&seed, known)));
             let pair = [(seed.ends[0], known[0]), (seed.ends[1], known[1])];
             let is_known = |h: &Hypothesis| pair.iter().all(|m| h.matches.binary_search(m).is_ok());
             if is_far || found.iter().any(is_known) {
                 return;
             }
             if let Some(hypothesis) = search.grow(&seed, known) {
+                most = most.max(hypothesis.matches.len());
                 found.push(hypothesis);
             }
         });
+        if tries > config.tries_max {
+            return None;
+        }
+        asked.push(seed.ends);
+        if most > config.matches_min && !is_coverable(&asked, seen.len() - most + 1) {
+            break;
+        }
     }
-    (tries <= config.tries_max).then_some(found)
+    Some(found)
+}
+
+/// Whether so many landmarks can be found that every pair has one of them.
+fn is_coverable(pairs: &[[usize; 2]], count: usize) -> bool {
+    let Some([a, b]) = pairs.first() else { return true };
+    count > 0
+        && [a, b].into_iter().any(|end| {
+            let rest: Vec<[usize; 2]> =
+                pairs.iter().filter(|pair| !pair.contains(end)).copied().collect();
+            is_coverable(&rest, count - 1)
+        })
+}
+
+/// Whether a pose lies far outside of what a guess and a pair's own uncertainty allow.
+fn is_far(prior: &UncertainPose<Level, Robot>, pose: &Pose<Level, Robot>) -> bool {
+    let slack = Covariance::from_variances([0.25, 0.25, 0.03]);
+    mahalanobis_sq(&between(&prior.pose, pose), &(prior.covariance + slack)) > 25.0
+}
+
+/// From one pose to another, as a vector.
+fn between(from: &Pose<Level, Robot>, to: &Pose<Level, Robot>) -> Vector3<f64> {
+    Vector3::new(to.x - from.x, to.y - from.y, difference(to.heading(), from.heading()))
 }
 
 /// Logarithm of the density of clutter over place, direction and kind, by kind: what the configuration says, or
@@ -292,12 +319,7 @@ impl Weigh<'_> {
         }
         let prior = match self.prior {
             Some(prior) => {
-                let off = nalgebra::Vector3::new(
-                    pose.x - prior.pose.x,
-                    pose.y - prior.pose.y,
-                    difference(pose.heading(), prior.pose.heading()),
-                );
-                ln_normal(&off, &(prior.covariance + *covariance))
+                ln_normal(&between(&prior.pose, pose), &(prior.covariance + *covariance))
             }
             None => -(table.area * TAU).ln(),
         };
@@ -339,7 +361,7 @@ impl Weigh<'_> {
 }
 
 /// Logarithm of a normal density.
-fn ln_normal<const N: usize>(off: &nalgebra::SVector<f64, N>, covariance: &Covariance<N>) -> f64
+fn ln_normal<const N: usize>(off: &SVector<f64, N>, covariance: &Covariance<N>) -> f64
 where
     Covariance<N>: Determinant,
 {

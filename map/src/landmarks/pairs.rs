@@ -1,11 +1,18 @@
 //! Pairs of landmarks by their length: which could be the two that a robot sees?
 
+use std::f64::consts::{PI, TAU};
+use std::ops::Range;
+
 use super::grid::Grid;
 use super::{Landmark, LandmarkKind};
 use crate::geometry::{Point, difference};
 
-/// Pairs of two kinds, ascending by length. The first is of the kind that comes first in the canonical
-/// order.
+/// Sectors that the direction of a pair's first landmark falls into: whoever knows it to 20 degrees looks
+/// at two or three of them.
+const SECTORS: usize = 16;
+
+/// Pairs of two kinds whose first landmark opens to one sector, ascending by length. The first is of the
+/// kind that comes first in the canonical order.
 #[derive(Debug, Clone, PartialEq, Default)]
 struct Group {
     /// Metres.
@@ -47,7 +54,7 @@ impl Shape {
 
     /// The same two the other way round.
     fn reversed(&self) -> Self {
-        let turned = |turn: f64| difference(turn, std::f64::consts::PI);
+        let turned = |turn: f64| difference(turn, PI);
         Self {
             kinds: [self.kinds[1], self.kinds[0]],
             length: self.length,
@@ -56,8 +63,21 @@ impl Shape {
     }
 }
 
-fn group_of([a, b]: [LandmarkKind; 2]) -> usize {
-    a as usize * LandmarkKind::ALL.len() + b as usize
+/// Where the groups of two kinds begin.
+fn first_group([a, b]: [LandmarkKind; 2]) -> usize {
+    (a as usize * LandmarkKind::ALL.len() + b as usize) * SECTORS
+}
+
+/// The sector of a direction, counted on beyond a whole turn; what looks the same from behind has its
+/// half turn for a whole one.
+fn sector(kind: LandmarkKind, turn: f64) -> i64 {
+    let whole = if kind.is_two_sided() { PI } else { TAU };
+    (turn / whole * SECTORS as f64).floor() as i64
+}
+
+fn group_of(shape: &Shape) -> usize {
+    let sector = sector(shape.kinds[0], shape.turns[0]).rem_euclid(SECTORS as i64);
+    first_group(shape.kinds) + sector as usize
 }
 
 impl Pairs {
@@ -68,7 +88,7 @@ impl Pairs {
         (shortest, longest): (f64, f64),
         is_fit: impl Fn(&Landmark) -> bool,
     ) -> Self {
-        let count = LandmarkKind::ALL.len().pow(2);
+        let count = LandmarkKind::ALL.len().pow(2) * SECTORS;
         let mut found: Vec<Vec<Pair>> = vec![Vec::new(); count];
         for (i, a) in landmarks.iter().enumerate().filter(|(_, a)| is_fit(a)) {
             for j in grid.near(&a.at, longest) {
@@ -87,7 +107,7 @@ impl Pairs {
                     (Shape::of(b, a), [j, i as u32])
                 };
                 let turns = shape.turns.map(|turn| turn as f32);
-                found[group_of(shape.kinds)].push((shape.length as f32, turns, ends));
+                found[group_of(&shape)].push((shape.length as f32, turns, ends));
             }
         }
         let groups = found.into_iter().map(|mut pairs| {
@@ -106,20 +126,12 @@ impl Pairs {
         self.groups.iter().map(|group| group.lengths.len()).sum()
     }
 
-    /// How many pairs have the kinds of `shape` and its length to within `gate` metres.
-    pub(super) fn population(&self, shape: &Shape, gate: f64) -> usize {
-        let (group, from, to) = self.stretch(&shape.in_order().0, gate);
-        let once = to - from;
-        if group < self.groups.len() && shape.kinds[0] == shape.kinds[1] { 2 * once } else { once }
-    }
-
-    fn stretch(&self, shape: &Shape, gate: f64) -> (usize, usize, usize) {
-        let group = group_of(shape.kinds);
-        let lengths = &self.groups[group].lengths;
-        let (low, high) = ((shape.length - gate) as f32, (shape.length + gate) as f32);
-        let from = lengths.partition_point(|length| *length < low);
-        let to = lengths.partition_point(|length| *length <= high);
-        (group, from, to)
+    /// How many pairs have the kinds of `shape`, its length to within `gate` metres, and the direction of one
+    /// landmark to within `turn_gate` radians.
+    pub(super) fn population(&self, shape: &Shape, gate: f64, turn_gate: f64) -> usize {
+        let mut count = 0;
+        self.stretches(shape, gate, turn_gate, |_, _, range, _| count += range.len());
+        count
     }
 
     /// Visits the pairs that may be the two of `shape`, as numbers of landmarks in the order of the
@@ -131,22 +143,41 @@ impl Pairs {
         turn_gate: f64,
         mut visit: impl FnMut([u32; 2]),
     ) {
-        let (ordered, is_swapped) = shape.in_order();
-        let mut look = |shape: &Shape, is_swapped: bool| {
-            let (group, from, to) = self.stretch(shape, gate);
-            let Group { turns, ends, .. } = &self.groups[group];
+        self.stretches(shape, gate, turn_gate, |shape, group, range, is_swapped| {
             let fits = |end: usize, turn: f32| {
                 shape.kinds[end].turn(f64::from(turn), shape.turns[end]).abs() <= turn_gate
             };
-            for (turns, ends) in turns[from..to].iter().zip(&ends[from..to]) {
+            for (turns, ends) in group.turns[range.clone()].iter().zip(&group.ends[range]) {
                 if fits(0, turns[0]) && fits(1, turns[1]) {
                     visit(if is_swapped { [ends[1], ends[0]] } else { *ends });
                 }
             }
-        };
-        look(&ordered, is_swapped);
-        if shape.kinds[0] == shape.kinds[1] {
-            look(&ordered.reversed(), !is_swapped);
+        });
+    }
+
+    /// The stretches of groups that may hold a shape, with the shape in their order and whether that is
+    /// the other way round.
+    fn stretches(
+        &self,
+        shape: &Shape,
+        gate: f64,
+        turn_gate: f64,
+        mut visit: impl FnMut(&Shape, &Group, Range<usize>, bool),
+    ) {
+        let (ordered, is_swapped) = shape.in_order();
+        let is_alike = shape.kinds[0] == shape.kinds[1];
+        let both = [(ordered, is_swapped), (ordered.reversed(), !is_swapped)];
+        for (shape, is_swapped) in both.into_iter().take(1 + usize::from(is_alike)) {
+            let (kind, turn) = (shape.kinds[0], shape.turns[0]);
+            let (from, to) = (sector(kind, turn - turn_gate), sector(kind, turn + turn_gate));
+            for sector in from..=to.min(from + SECTORS as i64 - 1) {
+                let sector = sector.rem_euclid(SECTORS as i64) as usize;
+                let group = &self.groups[first_group(shape.kinds) + sector];
+                let (low, high) = ((shape.length - gate) as f32, (shape.length + gate) as f32);
+                let from = group.lengths.partition_point(|length| *length < low);
+                let to = group.lengths.partition_point(|length| *length <= high);
+                visit(&shape, group, from..to, is_swapped);
+            }
         }
     }
 }
