@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Calibrates simulated scanners and measures their corrected ranges; finds lines in simulated scans and
 # holds them against the walls; compares what the maps of simulated fleets claim with truth; moves shelves; times what a server
-# answers about vast rasters; times the
+# answers about vast rasters; asks for places among landmarks; times the
 # fold of vast floors; replays every log there is through real servers on SQLite and PostgreSQL and
 # measures the maps; and rewrites the tables in BENCHMARKS.md. Logs and plans that may not be committed
 # are looked for in ../shared/data; without that folder: the committed logs and simulated worlds.
@@ -15,5 +15,6 @@ evaluate="${CARGO_TARGET_DIR:-target}/release/mapfold-evaluate"
 "$evaluate" honesty --report BENCHMARKS.md
 "$evaluate" change --report BENCHMARKS.md
 "$evaluate" serving --report BENCHMARKS.md
+"$evaluate" structures --report BENCHMARKS.md
 "$evaluate" growth --report BENCHMARKS.md --data ../shared/data
 scripts/with-postgres.sh "$evaluate" maps --report BENCHMARKS.md --data ../shared/data "$@"

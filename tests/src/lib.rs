@@ -20,6 +20,7 @@
 //! * [`range`]: simulated heads, their calibration, and how well their ranges are corrected.
 //! * [`change`]: how soon a map follows what has moved.
 //! * [`serving`]: how long a server takes to answer about small and vast rasters.
+//! * [`structures`]: whether and how fast a place is found among landmarks.
 //! * [`figure`]: a hallway's map as a picture.
 //! * [`evaluation`], [`speed`], [`statistics`], [`report`]: `mapfold-evaluate`, which writes tables between markers
 //!   into a page of text.
@@ -49,6 +50,7 @@ pub mod serving;
 pub mod simulation;
 pub mod speed;
 pub mod statistics;
+pub mod structures;
 pub mod trial;
 pub mod yardstick;
 

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use mapfold_tests::{
-    change, evaluation, extraction, figure, growth, honesty, range, serving, speed,
+    change, evaluation, extraction, figure, growth, honesty, range, serving, speed, structures,
 };
 
 /// Measures Mapfold and rewrites the tables of a report between their markers.
@@ -65,6 +65,12 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         report: PathBuf,
     },
+    /// Asks for a robot's place among up to 100 000 landmarks
+    Structures {
+        /// The page with the markers `structures`
+        #[arg(long, value_name = "FILE")]
+        report: PathBuf,
+    },
     /// Draws a hallway's vector map from a few scans of the committed log
     Figure {
         /// The SVG to write
@@ -103,6 +109,7 @@ async fn main() -> ExitCode {
         Command::Extraction { report, data } => extraction::extraction(&report, data.as_deref()),
         Command::Change { report } => change::table(&report),
         Command::Serving { report } => serving::tables(&report).await,
+        Command::Structures { report } => structures::table(&report),
         Command::Figure { out } => figure::write(&out).await.map(|()| Vec::new()),
         Command::Benches { report, criterion } => speed::benches(&report, &criterion),
     };

@@ -391,3 +391,28 @@ fn order(a: &Hypothesis, b: &Hypothesis) -> std::cmp::Ordering {
     let known = |h: &Hypothesis| -> Vec<u32> { h.matches.iter().map(|m| m.1).collect() };
     known(a).cmp(&known(b))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chance::Chance;
+
+    #[test]
+    fn a_cover_is_found_exactly_when_there_is_one() {
+        let mut chance = Chance(9);
+        for _ in 0..300 {
+            let landmarks = 2 + (6.0 * chance.share()) as usize;
+            let mut end = || (landmarks as f64 * chance.share()) as usize;
+            let pairs: Vec<[usize; 2]> =
+                (0..8).map(|_| [end(), end()]).filter(|[a, b]| a != b).collect();
+            for count in 0..=landmarks {
+                // All sets of so many landmarks, as bits.
+                let covers =
+                    |set: u32| pairs.iter().all(|pair| pair.iter().any(|end| set >> end & 1 == 1));
+                let there_is = (0..1_u32 << landmarks)
+                    .any(|set| set.count_ones() as usize == count && covers(set));
+                assert_eq!(is_coverable(&pairs, count), there_is, "{pairs:?} {count}");
+            }
+        }
+    }
+}
