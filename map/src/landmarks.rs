@@ -7,9 +7,10 @@
 //! none. Never a confident guess: one pose is answered only if all others together are a thousand times
 //! less likely.
 //!
-//! Knows nothing of scans (what is seen comes as [`ObservedLandmark`]s) and nothing of where landmarks come
-//! from.
+//! Landmarks come from walls, those of one look ([`landmarks_of_look`]) or of the map ([`landmarks_of_map`]).
+//! Knows nothing of scans.
 
+mod faces;
 mod fit;
 mod grid;
 mod hypothesis;
@@ -20,6 +21,7 @@ mod table;
 
 use crate::geometry::{Covariance, Point, difference};
 
+pub use faces::{FacesConfig, landmarks_of_look, landmarks_of_map};
 pub use fit::{Correspondence, FitError, PoseFit, fit_pose};
 pub use locate::{Candidate, Fix, LocateConfig, locate};
 pub use sight::{Obstacles, Sight};

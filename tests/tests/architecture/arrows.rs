@@ -49,7 +49,7 @@ const MODULES: &[(&str, &[ModuleRule])] = &[
             // For unit tests only.
             ("chance", &[]),
             ("geometry", &[]),
-            ("landmarks", &["chance", "geometry"]),
+            ("landmarks", &["chance", "geometry", "vector"]),
             ("raster", &["chance", "geometry"]),
             ("gdb", &["geometry", "raster"]),
             // Features bear the identities that contributions give them; of the fold they know nothing.
