@@ -6,6 +6,7 @@ mod faults;
 mod footprints;
 mod growth;
 mod hall;
+mod hostile;
 mod landmarks;
 mod order;
 mod priors;

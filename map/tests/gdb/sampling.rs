@@ -1,14 +1,14 @@
 //! Cuts of random unions against a point-in-solid test that knows nothing of meshes.
 
 use mapfold_map::gdb::{
-    Face, Kind, Object, Placement, Plan, PlanPoint, Point3, Polygon, Polyhedron, Shape, Solid,
-    Structure,
+    Face, Kind, Object, Outline, Placement, Plan, PlanPoint, Point3, Polygon, Polyhedron, Shape,
+    Solid, Structure,
 };
 use mapfold_map::geometry::Point;
 use nalgebra::UnitQuaternion;
 use proptest::prelude::*;
 
-use super::world::model;
+use super::world::{block, model};
 
 /// A prism over a star about a centre, upright but turned.
 #[derive(Debug, Clone)]
@@ -144,6 +144,48 @@ proptest! {
             // Flat cuts move far for a small change of depth: keep well away.
             if depths.iter().all(|d| d.abs() > 1e-3) {
                 prop_assert_eq!(solid(&plan, Point::new(x, y)), depths.iter().any(|d| *d > 0.0));
+            }
+        }
+    }
+
+    /// Boxes on a coarse grid: faces coincide, corners touch, walls end on walls. Cell by cell, and by area.
+    #[test]
+    fn a_plan_of_boxes_on_a_grid_is_right_in_every_cell(
+        boxes in prop::collection::vec((0..6_u8, 0..6_u8, 1..4_u8, 1..4_u8, 0..3_u8), 1..12),
+    ) {
+        let kinds = [Kind::Wall, Kind::Doorway, Kind::Machine];
+        let object = |(x, y, width, depth, kind): &(u8, u8, u8, u8, u8)| {
+            let from = [*x, *y].map(f64::from);
+            let to = [x + width, y + depth].map(f64::from);
+            block(kinds[usize::from(*kind)], from, to, [0.0, 1.0])
+        };
+        let plan = Structure::of(&model(boxes.iter().map(object))).plan(0.0);
+        let mut area = 0.0;
+        for (column, row) in (0..9_u8).flat_map(|column| (0..9_u8).map(move |row| (column, row))) {
+            let any = |wanted: u8| boxes.iter().any(|(x, y, width, depth, kind)| {
+                *kind == wanted && (*x..x + width).contains(&column) && (*y..y + depth).contains(&row)
+            });
+            let want = any(2) || (any(0) && !any(1));
+            prop_assert_eq!(solid(&plan, Point::new(f64::from(column) + 0.5, f64::from(row) + 0.5)), want);
+            area += if want { 1.0 } else { 0.0 };
+        }
+        let enclosed: f64 = plan.outlines().iter().map(Outline::area).sum();
+        prop_assert!((enclosed + area).abs() < 1e-9);
+        // Openings lie on faces of walls in doorways, with the wall on the right: a cell there is a wall's and a
+        // doorway's, and the one opposite has no wall.
+        for side in plan.openings().iter().flat_map(|opening| &opening.sides) {
+            let (from, to) = (side.from.metres(), side.to.metres());
+            let step = (to - from).normalize();
+            let count = (to - from).norm().round() as usize;
+            for k in 0..count {
+                let middle = from + step * (k as f64 + 0.5);
+                let right = middle + Point::new(step.y, -step.x) * 0.5;
+                let left = middle - Point::new(step.y, -step.x) * 0.5;
+                let any = |p: Point, wanted: u8| boxes.iter().any(|(x, y, width, depth, kind)| {
+                    let within = |v: f64, low: u8, size: u8| f64::from(low) < v && v < f64::from(low + size);
+                    *kind == wanted && within(p.x, *x, *width) && within(p.y, *y, *depth)
+                });
+                prop_assert!(any(right, 0) && any(right, 1) && !any(left, 0), "{:?}", side);
             }
         }
     }
