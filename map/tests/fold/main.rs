@@ -5,6 +5,7 @@ mod chains;
 mod clusters;
 mod existence;
 mod honesty;
+mod raster;
 mod set_function;
 mod walls;
 mod work;
