@@ -3,7 +3,7 @@
 //! A plain sum never forgets: a shelf that was seen for a month has to be seen gone for a month.
 //! So evidence is summed per *slice*, a stretch of time of fixed length, and a cell is read from the
 //! oldest slice to the newest: what the earlier ones come to is carried on, but for no more than a
-//! limit ([`SliceConfig::carried_most`]), and the next one's sum is added. What has changed is
+//! limit ([`SliceConfig`]), and the next one's sum is added. What has changed is
 //! believed after as many looks as overcome the limit, however long it was otherwise; what is not
 //! looked at any more stays as it was last seen, for no clock is asked.
 //!
