@@ -35,8 +35,11 @@ pub struct BreakpointConfig {
     pub confirming_points: usize,
     /// How many standard deviations they, and the point across, may lie off that line.
     pub confirming_sds: f64,
-    /// So many beams without a point always break.
+    /// So many beams without a point always break, if they also turn by more than `missing_turn`.
     pub missing_beams: usize,
+    /// Beams without a point that turn by less, radians, do not break by themselves: the finer a scanner's
+    /// beams, the more of them a pane or a lost packet takes, and the smaller is the gap.
+    pub missing_turn: f64,
 }
 
 impl Default for BreakpointConfig {
@@ -50,6 +53,7 @@ impl Default for BreakpointConfig {
             confirming_points: 4,
             confirming_sds: 3.0,
             missing_beams: 3,
+            missing_turn: 3f64.to_radians(),
         }
     }
 }
@@ -143,6 +147,8 @@ pub(super) fn find_runs(
 /// How far apart the points of one surface can be from one beam to the next.
 struct Reach {
     increment: f64,
+    /// Most beams from one point to the next.
+    steps_max: usize,
     /// Growth with range, for neighbours.
     surface: f64,
     /// The same where a line bridges the gap.
@@ -153,6 +159,7 @@ impl Reach {
     fn new(increment: f64, config: &BreakpointConfig) -> Self {
         Self {
             increment,
+            steps_max: config.missing_beams.max((config.missing_turn / increment) as usize),
             surface: growth(increment, config.worst_incidence),
             line: growth(increment, config.worst_incidence_of_line),
         }
@@ -186,7 +193,7 @@ impl Reach {
         ring: Ring,
         config: &BreakpointConfig,
     ) -> Gap {
-        let Some(steps) = ring.steps(a.beam, b.beam).filter(|s| *s <= config.missing_beams) else {
+        let Some(steps) = ring.steps(a.beam, b.beam).filter(|s| *s <= self.steps_max) else {
             return Gap::Apart;
         };
         let (surface, line) = if steps == 1 {
@@ -325,6 +332,27 @@ mod tests {
         ranges[6] = None;
         ranges[7] = None;
         assert_eq!(runs_of(&ranges, false).1, [0..5, 5..17]);
+    }
+
+    #[test]
+    fn a_few_missing_beams_of_a_fine_scanner_break_no_wall() {
+        // A quarter of a degree from beam to beam, ten of forty lost, at 2 m: gaps of 9 cm.
+        let fine = |lost: usize| {
+            let mut points: Vec<ScanPoint> = (0..400_usize)
+                .filter(|beam| beam % 40 >= lost)
+                .map(|beam| {
+                    let direction = unit_normal(0.25_f64.to_radians() * beam as f64);
+                    ScanPoint::new(beam, 2.0, direction, &NOISE)
+                })
+                .collect();
+            let (mut gaps, mut runs) = (Vec::new(), Vec::new());
+            let ring = Ring { closed: false, beams: 400 };
+            let increment = 0.25_f64.to_radians();
+            let config = BreakpointConfig::default();
+            find_runs(&mut points, ring, increment, &config, &mut gaps, &mut runs);
+            runs.len()
+        };
+        assert_eq!((fine(3), fine(10), fine(13)), (1, 1, 10));
     }
 
     #[test]

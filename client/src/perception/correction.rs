@@ -38,6 +38,8 @@ pub struct CorrectionConfig {
     pub surface_incidence_max: f64,
     /// So many beams without a point break a surface.
     pub missing_beams: usize,
+    /// Unless they turn by less than this, radians.
+    pub missing_turn: f64,
 }
 
 impl CorrectionConfig {
@@ -49,7 +51,13 @@ impl CorrectionConfig {
         line_rms: 3.0,
         surface_incidence_max: 80.0 * std::f64::consts::PI / 180.0,
         missing_beams: 3,
+        missing_turn: 3.0 * std::f64::consts::PI / 180.0,
     };
+
+    /// Most beams from one point of a surface to the next.
+    fn steps_max(&self, increment: f64) -> usize {
+        self.missing_beams.max((self.missing_turn / increment) as usize)
+    }
 }
 
 /// The noise of one corrected range.
@@ -175,7 +183,7 @@ impl Corrector {
         self.incidences.begin();
         let mut listing = Listing {
             table: &self.table,
-            missing_beams: self.config.missing_beams as i32,
+            missing_beams: self.config.steps_max(scan.geometry.increment) as i32,
             reach: scan.geometry.increment * self.steepest,
             before: None,
             incidences: &mut self.incidences,

@@ -19,9 +19,11 @@ impl ScanGeometry {
         self.first_bearing + self.increment * beam as f64
     }
 
-    /// Whether `count` beams go all the way round, so that the last is the first one's neighbour.
+    /// Whether `count` beams go all the way round, so that the last is the first one's neighbour: one step
+    /// from it, none if drivers repeat the first beam at the end, or two if they leave the last out.
     pub fn is_full_circle(&self, count: usize) -> bool {
-        count > 2 && (self.increment * count as f64 - TAU).abs() < 0.5 * self.increment
+        let steps_left = TAU / self.increment - count as f64 + 1.0;
+        count > 2 && steps_left > -0.5 && steps_left < 2.5
     }
 }
 
@@ -94,7 +96,9 @@ mod tests {
         let one_degree = ScanGeometry { first_bearing: 0.0, increment: 1f64.to_radians() };
         assert!(one_degree.is_full_circle(360));
         assert!(!one_degree.is_full_circle(181));
-        assert!(!one_degree.is_full_circle(359));
-        assert!(!one_degree.is_full_circle(361));
+        assert!(one_degree.is_full_circle(359));
+        assert!(one_degree.is_full_circle(361));
+        assert!(!one_degree.is_full_circle(358));
+        assert!(!one_degree.is_full_circle(362));
     }
 }
