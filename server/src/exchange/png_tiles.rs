@@ -10,7 +10,7 @@
 //! transparent, free space very light, obstacles dark; what only sonar speaks of has a hue of its
 //! own (orange against blue), and what only the prior does has none (grey).
 //!
-//! Up to [`ZOOM_COARSE`] a picture is made of the four below it, which are kept: one that shows a
+//! Up to `ZOOM_COARSE` a picture is made of the four below it, which are kept: one that shows a
 //! hundred thousand tiles costs what has changed in it, not what is in it.
 
 mod cache;
