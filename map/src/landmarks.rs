@@ -2,7 +2,7 @@
 //!
 //! A landmark is a corner of walls, a free end of a wall or a doorway, with the direction that it opens
 //! to. A single one tells little; the distances, directions and kinds within a group of them tell a place.
-//! [`LandmarkTable`] holds a level's landmarks so that structures of them are found fast; [`locate`] holds
+//! [`LandmarkTable`] holds a level's landmarks so that structures of them are found fast; [`locate()`] holds
 //! what a robot sees against it and answers with a [`Fix`]: one pose, several that cannot be told apart, or
 //! none. Never a confident guess: one pose is answered only if all others together are a thousand times
 //! less likely.
