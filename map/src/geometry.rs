@@ -1,6 +1,7 @@
 //! Plane geometry with uncertainty. Knows nothing of maps, robots' logs or grids.
 
 mod angle;
+mod chi_square;
 mod covariance;
 mod frame;
 mod hull;
@@ -9,11 +10,12 @@ mod line;
 mod pose;
 
 pub use angle::{difference, wrap};
+pub use chi_square::chi_square_quantile;
 pub use covariance::{Covariance, CovarianceError, mahalanobis_sq};
 pub use frame::{Level, Odom, Robot, Sensor};
 pub use hull::{convex_hull, convex_hull_into, distance_to_hull};
 pub use interval::{Interval, subtract_intervals, union_intervals};
-pub(crate) use line::Axes;
+pub(crate) use line::{Axes, offset_variance};
 pub use line::{Line, MovedLine, UncertainLine, tangent, unit_normal};
 pub use pose::{Pose, UncertainPose};
 

@@ -8,6 +8,7 @@ use super::contours::Bordering;
 use super::exact::PlanPoint;
 use super::{ObjectId, Opening, Outline, Plan, Sheet};
 use crate::geometry::{Covariance, Point, wrap};
+use crate::landmarks::LandmarkKind;
 
 /// What counts as a landmark.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,19 +27,6 @@ impl LandmarkConfig {
     /// The defaults.
     pub const STANDARD: Self =
         Self { wall_min: 0.25, corner_sine_min: 0.35, straight_sine_max: 0.02, detail_min: 0.001 };
-}
-
-/// The kind of a landmark.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum LandmarkKind {
-    /// Two walls with more than half a turn of free space between them.
-    ConvexCorner,
-    /// Two walls with less than half a turn of free space between them.
-    ConcaveCorner,
-    /// The end of a wall that is too thin for corners.
-    FreeEnd,
-    /// An opening in a wall.
-    Doorway,
 }
 
 /// Identity of a landmark: what it is, whose, and where. Nothing else in the model can rename it, and plans of
@@ -227,7 +215,7 @@ impl Finder<'_> {
         let covariance = covariance(&place, turn_sd(sd, length));
         let heading = outward.y.atan2(outward.x);
         Some(self.landmark(
-            LandmarkKind::FreeEnd,
+            LandmarkKind::WallEnd,
             owners,
             middle,
             heading,
@@ -264,7 +252,7 @@ impl Finder<'_> {
                 let owners = [run.owners[1]; 2];
                 let heading = u.y.atan2(u.x);
                 found.push(self.landmark(
-                    LandmarkKind::FreeEnd,
+                    LandmarkKind::WallEnd,
                     owners,
                     run.to,
                     heading,

@@ -65,6 +65,12 @@ impl<F: Copy> Line<F> {
     }
 }
 
+/// Variance of a line's offset at coordinate `along`: that of `rho - along * alpha`.
+pub(crate) fn offset_variance(c: &Covariance<2>, along: f64) -> f64 {
+    let c = c.matrix();
+    (c[(0, 0)] - 2.0 * along * c[(0, 1)] + along * along * c[(1, 1)]).max(0.0)
+}
+
 /// A line with its unit vectors worked out, for many questions about it; the answers are those of
 /// [`Line`] to the last bit.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,7 +5,7 @@ use nalgebra::Matrix2;
 
 use super::grid::Grid;
 use super::{Landmark, LandmarkKind, ObservedLandmark};
-use crate::geometry::{Covariance, Line, Point, tangent};
+use crate::geometry::{Covariance, Line, Point, offset_variance, tangent};
 use crate::vector::{EndKind, Facing, ObservedSegment, Segment};
 
 /// When walls make a landmark.
@@ -97,8 +97,7 @@ impl Face {
 
     /// Variance of the line's offset at a point of it: that of `rho - along * alpha`.
     fn offset_variance(&self, p: &Point) -> f64 {
-        let (c, along) = (self.covariance.matrix(), self.tangent.dot(p));
-        (c[(0, 0)] - 2.0 * along * c[(0, 1)] + along * along * c[(1, 1)]).max(1e-8)
+        offset_variance(&self.covariance, self.tangent.dot(p)).max(1e-8)
     }
 
     fn direction_variance(&self) -> f64 {

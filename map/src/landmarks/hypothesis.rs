@@ -1,12 +1,13 @@
 //! From two landmarks that may be two of the table's to a pose that explains as many as it can.
 
-use nalgebra::Vector2;
-
 use super::fit::{Correspondence, PoseFit, fit_pose};
 use super::locate::LocateConfig;
 use super::pairs::middle;
 use super::{LandmarkTable, ObservedLandmark};
-use crate::geometry::{Level, Point, Pose, Robot, difference, mahalanobis_sq};
+use crate::geometry::{Level, Point, Pose, Robot, chi_square_quantile, difference, mahalanobis_sq};
+
+/// The 99.9 % quantile of the standard normal distribution: a pose whose matches agree worse is none.
+const WORST_SDS: f64 = 3.0902;
 
 /// Which landmark seen is which of the table.
 pub(super) type Match = (usize, u32);
@@ -134,7 +135,7 @@ impl Search<'_> {
                 let turn_sd_sq = self.direction_sd(seen, landmark.direction_sd).powi(2)
                     + fit.level_from_robot.covariance.matrix()[(2, 2)];
                 let (residual, covariance) = self.pair((k, number)).residual(pose);
-                let off_sq = mahalanobis_sq::<2>(&Vector2::from(residual), &(covariance + of_pose));
+                let off_sq = mahalanobis_sq(&residual, &(covariance + of_pose));
                 if off_sq <= self.config.gate && turn * turn <= self.config.gate * turn_sd_sq {
                     possible.push((off_sq, (k, number)));
                 }
@@ -155,7 +156,7 @@ impl Search<'_> {
     fn settled(&self, mut matches: Vec<Match>) -> Option<Hypothesis> {
         loop {
             let fit = self.fit(&matches)?;
-            if fit.chi_sq <= chi_square_99_9(2 * matches.len() - 3) {
+            if fit.chi_sq <= chi_square_quantile(2 * matches.len() - 3, WORST_SDS) {
                 return Some(Hypothesis { fit, matches });
             }
             if matches.len() <= self.config.matches_min {
@@ -191,11 +192,4 @@ pub(super) fn is_near(
 ) -> bool {
     (a.position() - b.position()).norm_squared() <= place * place
         && difference(a.heading(), b.heading()).abs() <= turn
-}
-
-/// The 99.9 % quantile of chi-square (Wilson and Hilferty 1931).
-fn chi_square_99_9(dof: usize) -> f64 {
-    let k = dof.max(1) as f64;
-    let h = 2.0 / (9.0 * k);
-    k * (1.0 - h + 3.0902 * h.sqrt()).powi(3)
 }

@@ -13,7 +13,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::{SVector, Vector3};
+use nalgebra::Vector3;
 
 use super::hypothesis::{Hypothesis, Match, Search, Seed, is_near};
 use super::pairs::Shape;
@@ -313,13 +313,15 @@ impl Weigh<'_> {
             let (residual, place) = self.search.pair((k, *number)).residual(pose);
             let turn = landmark.kind.turn(known.direction, landmark.direction + pose.heading());
             let sd = self.search.direction_sd(landmark, known.direction_sd);
-            weight += self.detection(landmark.kind).ln() + ln_normal(&residual, &place)
-                - 0.5 * (turn / sd).powi(2)
-                - (sd * TAU.sqrt()).ln();
+            weight += self.detection(landmark.kind).ln()
+                + ln_normal(mahalanobis_sq(&residual, &place), place.matrix().determinant(), 2)
+                + ln_normal((turn / sd).powi(2), sd * sd, 1);
         }
         let prior = match self.prior {
             Some(prior) => {
-                ln_normal(&between(&prior.pose, pose), &(prior.covariance + *covariance))
+                let both = prior.covariance + *covariance;
+                let off_sq = mahalanobis_sq(&between(&prior.pose, pose), &both);
+                ln_normal(off_sq, both.matrix().determinant(), 3)
             }
             None => -(table.area * TAU).ln(),
         };
@@ -360,30 +362,9 @@ impl Weigh<'_> {
     }
 }
 
-/// Logarithm of a normal density.
-fn ln_normal<const N: usize>(off: &SVector<f64, N>, covariance: &Covariance<N>) -> f64
-where
-    Covariance<N>: Determinant,
-{
-    -0.5 * mahalanobis_sq(off, covariance)
-        - 0.5 * (TAU.powi(N as i32) * covariance.determinant()).ln()
-}
-
-/// Determinants of the sizes that are used.
-trait Determinant {
-    fn determinant(&self) -> f64;
-}
-
-impl Determinant for Covariance<2> {
-    fn determinant(&self) -> f64 {
-        self.matrix().determinant()
-    }
-}
-
-impl Determinant for Covariance<3> {
-    fn determinant(&self) -> f64 {
-        self.matrix().determinant()
-    }
+/// Logarithm of a normal density of so many dimensions.
+fn ln_normal(off_sq: f64, determinant: f64, dimensions: i32) -> f64 {
+    -0.5 * off_sq - 0.5 * (TAU.powi(dimensions) * determinant).ln()
 }
 
 /// An order that does not depend on how hypotheses were found.

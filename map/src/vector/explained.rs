@@ -4,10 +4,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::piece::offset_variance;
 use super::squares::{Extent, Squares};
 use super::{Cluster, Segment, VectorConfig};
-use crate::geometry::{Covariance, Point, unit_normal};
+use crate::geometry::{Covariance, Point, offset_variance, unit_normal};
 use crate::level::FeatureId;
 
 /// Where clusters and published segments are.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::slots::Slot;
 use super::{EndKind, Facing, Segment, VectorConfig};
-use crate::geometry::{Covariance, Point, unit_normal};
+use crate::geometry::{Covariance, Point, offset_variance, unit_normal};
 use crate::level::FeatureId;
 
 /// Name of a piece: a segment and the place among its solid parts.
@@ -85,10 +85,4 @@ impl Piece {
         let along = self.segment.line.along(p);
         [&self.segment.independent, &self.segment.dependent].map(|c| offset_variance(c, along))
     }
-}
-
-/// Variance of a line's offset at coordinate `along`: that of `rho - along * alpha`.
-pub(super) fn offset_variance(c: &Covariance<2>, along: f64) -> f64 {
-    let c = c.matrix();
-    (c[(0, 0)] - 2.0 * along * c[(0, 1)] + along * along * c[(1, 1)]).max(0.0)
 }

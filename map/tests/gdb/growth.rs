@@ -1,8 +1,7 @@
 //! What a plan costs grows with the model, not with its square.
 
-use mapfold_map::gdb::{
-    LandmarkConfig, LandmarkKind, Model, Object, PlanWork, Structure, landmarks,
-};
+use mapfold_map::gdb::{LandmarkConfig, Model, Object, PlanWork, Structure, landmarks};
+use mapfold_map::landmarks::LandmarkKind;
 
 use super::world::{doorway, model, wall};
 

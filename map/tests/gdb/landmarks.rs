@@ -3,13 +3,13 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use mapfold_map::gdb::{
-    Kind, Landmark, LandmarkConfig, LandmarkKind, Object, Placement, Plan, Point3, Shape, Solid,
-    landmarks,
+    Kind, Landmark, LandmarkConfig, Object, Placement, Plan, Point3, Shape, Solid, landmarks,
 };
 use mapfold_map::geometry::wrap;
 
 use super::world::{block, doorway, id, metres, plan, wall};
-use LandmarkKind::{ConcaveCorner, ConvexCorner, Doorway, FreeEnd};
+use LandmarkKind::{ConcaveCorner, ConvexCorner, Doorway, WallEnd};
+use mapfold_map::landmarks::LandmarkKind;
 
 fn of(plan: &Plan) -> Vec<Landmark> {
     landmarks(plan, &LandmarkConfig::STANDARD)
@@ -71,7 +71,7 @@ fn every_corner_end_and_doorway_is_found_and_none_invented() {
         (ConcaveCorner, [7.1, 5.8], -45),
         (ConcaveCorner, [7.0, 5.8], -135),
         (ConcaveCorner, [5.1, 5.8], -45),
-        (FreeEnd, [7.05, 4.0], -90),
+        (WallEnd, [7.05, 4.0], -90),
         (Doorway, [5.05, 1.5], 0),
     ];
     want.sort_by(|a, b| a.partial_cmp(b).unwrap());
@@ -188,8 +188,8 @@ fn a_sheet_has_corners_on_both_sides_and_ends() {
     let want = [
         (ConvexCorner, [2.0, 0.0], -45),
         (ConcaveCorner, [2.0, 0.0], 135),
-        (FreeEnd, [0.0, 0.0], 180),
-        (FreeEnd, [2.0, 2.0], 90),
+        (WallEnd, [0.0, 0.0], 180),
+        (WallEnd, [2.0, 2.0], 90),
     ];
     assert_eq!(seen(&plan), want);
 }

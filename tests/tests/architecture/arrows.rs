@@ -51,7 +51,7 @@ const MODULES: &[(&str, &[ModuleRule])] = &[
             ("geometry", &[]),
             ("landmarks", &["chance", "geometry", "vector"]),
             ("raster", &["chance", "geometry"]),
-            ("gdb", &["geometry", "raster"]),
+            ("gdb", &["geometry", "landmarks::LandmarkKind", "raster"]),
             // Features bear the identities that contributions give them; of the fold they know nothing.
             (
                 "vector",
