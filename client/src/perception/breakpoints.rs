@@ -15,6 +15,26 @@ use mapfold_map::geometry::Point;
 
 use super::points::ScanPoint;
 
+/// How many beams without a point break a surface: both so many, and so wide a turn of them. The finer a
+/// scanner's beams, the more of them a pane or a lost packet takes, and the smaller is the gap.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Missing {
+    /// Beams from one point to the next.
+    pub beams: usize,
+    /// Radians.
+    pub turn: f64,
+}
+
+impl Missing {
+    /// The default.
+    pub const STANDARD: Self = Self { beams: 3, turn: 3.0 * std::f64::consts::PI / 180.0 };
+
+    /// Most beams from one point of a surface to the next.
+    pub(super) fn steps_max(&self, increment: f64) -> usize {
+        self.beams.max((self.turn / increment) as usize)
+    }
+}
+
 /// When neighbours are apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BreakpointConfig {
@@ -35,11 +55,8 @@ pub struct BreakpointConfig {
     pub confirming_points: usize,
     /// How many standard deviations they, and the point across, may lie off that line.
     pub confirming_sds: f64,
-    /// So many beams without a point always break, if they also turn by more than `missing_turn`.
-    pub missing_beams: usize,
-    /// Beams without a point that turn by less, radians, do not break by themselves: the finer a scanner's
-    /// beams, the more of them a pane or a lost packet takes, and the smaller is the gap.
-    pub missing_turn: f64,
+    /// Beams without a point that break.
+    pub missing: Missing,
 }
 
 impl Default for BreakpointConfig {
@@ -52,8 +69,7 @@ impl Default for BreakpointConfig {
             gap_max: 0.65,
             confirming_points: 4,
             confirming_sds: 3.0,
-            missing_beams: 3,
-            missing_turn: 3f64.to_radians(),
+            missing: Missing::STANDARD,
         }
     }
 }
@@ -159,7 +175,7 @@ impl Reach {
     fn new(increment: f64, config: &BreakpointConfig) -> Self {
         Self {
             increment,
-            steps_max: config.missing_beams.max((config.missing_turn / increment) as usize),
+            steps_max: config.missing.steps_max(increment),
             surface: growth(increment, config.worst_incidence),
             line: growth(increment, config.worst_incidence_of_line),
         }

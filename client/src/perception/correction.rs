@@ -16,6 +16,7 @@
 use mapfold_map::geometry::Point;
 
 use super::BeamState;
+use super::breakpoints::Missing;
 use super::incidence::{Incidences, NO_BEAM, Spot};
 use super::points::Directions;
 use crate::sensor::{RangeTable, Scan, ScannerProfile, TableSpot};
@@ -37,9 +38,7 @@ pub struct CorrectionConfig {
     /// from grazing as the worst incidence of a table, for raw ranges are bent.
     pub surface_incidence_max: f64,
     /// So many beams without a point break a surface.
-    pub missing_beams: usize,
-    /// Unless they turn by less than this, radians.
-    pub missing_turn: f64,
+    pub missing: Missing,
 }
 
 impl CorrectionConfig {
@@ -50,14 +49,8 @@ impl CorrectionConfig {
         sides_rms: 1.5,
         line_rms: 3.0,
         surface_incidence_max: 80.0 * std::f64::consts::PI / 180.0,
-        missing_beams: 3,
-        missing_turn: 3.0 * std::f64::consts::PI / 180.0,
+        missing: Missing::STANDARD,
     };
-
-    /// Most beams from one point of a surface to the next.
-    fn steps_max(&self, increment: f64) -> usize {
-        self.missing_beams.max((self.missing_turn / increment) as usize)
-    }
 }
 
 /// The noise of one corrected range.
@@ -183,7 +176,7 @@ impl Corrector {
         self.incidences.begin();
         let mut listing = Listing {
             table: &self.table,
-            missing_beams: self.config.steps_max(scan.geometry.increment) as i32,
+            missing_beams: self.config.missing.steps_max(scan.geometry.increment) as i32,
             reach: scan.geometry.increment * self.steepest,
             before: None,
             incidences: &mut self.incidences,
