@@ -9,9 +9,8 @@ use super::access::{LevelFor, Read};
 use super::answer::Reader;
 use super::problem::ApiError;
 use super::query::QueryOf;
-use super::raster::sums;
+use super::raster::{parts, sums};
 use super::tiles::LayerName;
-use crate::exchange::layers::{Layer, LayerId};
 use crate::store::tile_cells;
 
 /// Media type of a batch. Its tiles are packed already, so it is not packed again.
@@ -74,10 +73,7 @@ pub(super) async fn read(
     let snapshot = level.level.snapshot();
     let revision = snapshot.folded_revision();
     let write = move || {
-        let parts: Vec<LayerId> = match query.layer {
-            Some(layer) => Layer::from(layer).parts().collect(),
-            None => Layer::All.parts().filter(|part| *part != LayerId::Prior).collect(),
-        };
+        let parts = parts(query.layer);
         let mut batch = MAGIC.to_vec();
         batch.extend((query.tiles.len() as u32).to_le_bytes());
         for at in query.tiles {

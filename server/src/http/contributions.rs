@@ -15,7 +15,7 @@ use super::access::{Contribute, LevelFor, Read};
 use super::answer::{Reader, blocking, created};
 use super::body;
 use super::problem::ApiError;
-use super::query::{QueryOf, before};
+use super::query::{QueryOf, before, page_limit};
 use super::state::App;
 use crate::auth::Principal;
 use crate::level::{Accepted, SubmitError};
@@ -248,10 +248,7 @@ pub(super) async fn list(
     reader: Reader,
 ) -> Result<Response, ApiError> {
     let before = before(query.cursor.as_deref())?;
-    let limit = query.limit.unwrap_or(PAGE);
-    if !(1..=PAGE_MAX).contains(&limit) {
-        return Err(ApiError::Query(format!("`limit` is 1 to {PAGE_MAX}.")));
-    }
+    let limit = page_limit(query.limit, PAGE, PAGE_MAX)?;
     let filter =
         LogFilter { robot: query.robot, state: query.state, since: query.since, bbox: query.bbox };
     let (site, name) = (level.level.site(), level.level.level());

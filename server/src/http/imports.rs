@@ -13,7 +13,7 @@ use super::answer::{Reader, blocking, created};
 use super::body::{self, media_type};
 use super::exports::ZIP;
 use super::problem::ApiError;
-use super::query::{QueryOf, before};
+use super::query::{QueryOf, before, page_limit};
 use super::state::App;
 use crate::auth;
 use crate::exchange::nav2::{Package, Trust};
@@ -127,10 +127,7 @@ pub(super) async fn list(
     reader: Reader,
 ) -> Result<Response, ApiError> {
     let before = before(query.cursor.as_deref())?;
-    let limit = query.limit.unwrap_or(PAGE);
-    if !(1..=PAGE_MAX).contains(&limit) {
-        return Err(ApiError::Query(format!("`limit` is 1 to {PAGE_MAX}.")));
-    }
+    let limit = page_limit(query.limit, PAGE, PAGE_MAX)?;
     let (site, name) = (level.level.site(), level.level.level());
     reader.small(&app.store().import_page(site, name, before, limit).await?)
 }

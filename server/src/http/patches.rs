@@ -8,7 +8,7 @@ use serde::Deserialize;
 use super::access::{LevelFor, Read};
 use super::answer::{DATA, Reader};
 use super::problem::ApiError;
-use super::query::QueryOf;
+use super::query::{QueryOf, page_limit};
 
 /// Things of a page, if the request names no number; and at most.
 const PAGE: usize = 2000;
@@ -44,10 +44,7 @@ pub(super) async fn read(
     QueryOf(query): QueryOf<PatchQuery>,
     reader: Reader,
 ) -> Result<Response, ApiError> {
-    let limit = query.limit.unwrap_or(PAGE);
-    if !(1..=PAGE_MAX).contains(&limit) {
-        return Err(ApiError::Query(format!("`limit` is 1 to {PAGE_MAX}.")));
-    }
+    let limit = page_limit(query.limit, PAGE, PAGE_MAX)?;
     let media_type = reader.choose(DATA)?;
     let snapshot = level.snapshot_since(query.since).await?;
     let revision = snapshot.folded_revision();

@@ -1,5 +1,7 @@
 //! The part of a URL behind the question mark, and typed parts of its path.
 
+use std::fmt::Display;
+
 use axum::extract::rejection::QueryRejection;
 use axum::extract::{FromRequestParts, Query};
 use axum::http::request::Parts;
@@ -44,6 +46,19 @@ pub(super) struct SinceInBox {
 pub(super) fn before(cursor: Option<&str>) -> Result<Option<i64>, ApiError> {
     let unknown = |_| ApiError::Query("`cursor` is not one that this server gave.".to_owned());
     cursor.map(str::parse::<i64>).transpose().map_err(unknown)
+}
+
+/// How much a page holds: `limit` if the request names one, and at most so much.
+pub(super) fn page_limit<N: Copy + PartialOrd + Display + From<u8>>(
+    limit: Option<N>,
+    usual: N,
+    most: N,
+) -> Result<N, ApiError> {
+    let limit = limit.unwrap_or(usual);
+    if limit < N::from(1) || limit > most {
+        return Err(ApiError::Query(format!("`limit` is 1 to {most}.")));
+    }
+    Ok(limit)
 }
 
 /// `min_x,min_y,max_x,max_y` in metres.

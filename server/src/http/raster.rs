@@ -13,6 +13,7 @@ use super::problem::ApiError;
 use super::query::{QueryOf, SinceInBox};
 use super::tiles::LayerName;
 use crate::exchange::layers::{Layer, LayerId, Raster};
+use crate::store::tile_cells;
 
 const BINARY: &str = "application/octet-stream";
 
@@ -83,16 +84,23 @@ pub(super) async fn tile(
             return Err(ApiError::Query("`sensor` and `layer` exclude each other.".to_owned()));
         }
         (Some(sensor), None) => vec![LayerId::Sensor(sensor.into())],
-        (None, Some(layer)) => Layer::from(layer).parts().collect(),
-        (None, None) => Layer::All.parts().filter(|part| *part != LayerId::Prior).collect(),
+        (None, layer) => parts(layer),
     };
     let missing = || ApiError::not_found("tile", format!("{x}/{y}"));
     let (Ok(x_index), Ok(y_index)) = (x.parse(), y.parse()) else { return Err(missing()) };
     let tile = TileIndex { x: x_index, y: y_index };
     let sums = sums(&*level.level.snapshot(), tile, &parts).ok_or_else(missing)?;
-    let bytes: Vec<u8> = sums.cells().iter().flat_map(|sum| sum.to_le_bytes()).collect();
+    let bytes = tile_cells::bytes(&sums);
     let tag = Tag::of_bytes(&bytes);
     Ok(reader.bytes(media_type, &tag, || bytes))
+}
+
+/// The layers of which evidence is summed: those of robots, if none is named.
+pub(super) fn parts(layer: Option<LayerName>) -> Vec<LayerId> {
+    match layer {
+        Some(layer) => Layer::from(layer).parts().collect(),
+        None => Layer::All.parts().filter(|part| *part != LayerId::Prior).collect(),
+    }
 }
 
 /// The cells of the sum of some layers; `None` without evidence.

@@ -14,7 +14,7 @@ use super::answer::{Reader, created};
 use super::body::Payload;
 use super::check;
 use super::problem::ApiError;
-use super::query::{QueryOf, before};
+use super::query::{QueryOf, before, page_limit};
 use super::state::App;
 use crate::auth;
 use crate::store::acts::{NewAct, Targets};
@@ -101,10 +101,7 @@ pub(super) async fn list(
     reader: Reader,
 ) -> Result<Response, ApiError> {
     let before = before(query.cursor.as_deref())?;
-    let limit = query.limit.unwrap_or(PAGE);
-    if !(1..=PAGE_MAX).contains(&limit) {
-        return Err(ApiError::Query(format!("`limit` is 1 to {PAGE_MAX}.")));
-    }
+    let limit = page_limit(query.limit, PAGE, PAGE_MAX)?;
     let (site, name) = (level.level.site(), level.level.level());
     reader.small(&app.store().revert_page(site, name, before, limit).await?)
 }

@@ -22,7 +22,7 @@ use crate::store::acts::ActRow;
 use crate::store::levels::LevelRow;
 use crate::store::log::LogRow;
 use crate::store::map_rows::{FeatureRow, MapRows, StoredMap};
-use crate::store::{Store, StoreError, payload};
+use crate::store::{Store, StoreError, payload, tile_cells};
 use acts::Acts;
 
 /// Rows of the log that are read and folded at once.
@@ -427,7 +427,7 @@ fn map_digest(folding: &Folding) -> Result<String, StoreError> {
         }
     }
     for (key, tile) in &folding.level().map().tiles {
-        let cells: Vec<u8> = tile.cells().iter().flat_map(|cell| cell.to_le_bytes()).collect();
+        let cells = tile_cells::bytes(tile);
         add("tile", &format!("{:?}/{}/{}", key.class, key.tile.x, key.tile.y), &cells);
     }
     let mut hex = String::new();

@@ -9,7 +9,7 @@ use uuid::Uuid;
 
 use super::acts::next_revision;
 use super::payload::PayloadError;
-use super::row::{corrupt, get};
+use super::row::{corrupt, get, next_page};
 use super::transaction::Tx;
 use super::values::{Bulk, bulk};
 use super::{Store, StoreError, retried, tile_cells};
@@ -160,9 +160,7 @@ impl Store {
             .fetch_all(self.reads())
             .await?;
         let mut imports = rows.iter().map(describe).collect::<Result<Vec<_>, _>>()?;
-        let more = imports.len() > limit as usize;
-        imports.truncate(limit as usize);
-        let next = imports.last().filter(|_| more).map(|last| last.revision.to_string());
+        let next = next_page(&mut imports, limit, |last| last.revision);
         Ok(v1::ImportPage { imports, next })
     }
 

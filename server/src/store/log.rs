@@ -8,7 +8,7 @@ use uuid::Uuid;
 use super::acts::{ActRow, first_act_after};
 use super::imports::first_import_after;
 use super::payload::{self, Payload};
-use super::row::{corrupt, count, get};
+use super::row::{corrupt, count, get, next_page};
 use super::transaction::Tx;
 use super::values::{Bulk, bulk_in};
 use super::{Store, StoreError};
@@ -150,9 +150,7 @@ impl Store {
             .fetch_all(self.reads())
             .await?;
         let mut contributions = rows.iter().map(entry).collect::<Result<Vec<_>, _>>()?;
-        let more = contributions.len() > limit as usize;
-        contributions.truncate(limit as usize);
-        let next = contributions.last().filter(|_| more).map(|last| last.revision.to_string());
+        let next = next_page(&mut contributions, limit, |last| last.revision);
         Ok(v1::ContributionPage { contributions, next })
     }
 

@@ -7,13 +7,17 @@ use super::payload::PayloadError;
 const ZSTD_LEVEL: i32 = 1;
 const CELL_BYTES: usize = size_of::<i32>();
 
+/// The cells of a tile: row by row from below, little-endian.
+pub fn bytes(tile: &Tile) -> Vec<u8> {
+    tile.cells().iter().flat_map(|cell| cell.to_le_bytes()).collect()
+}
+
 /// The column of a tile.
 ///
 /// # Errors
 /// No memory for it.
 pub fn encode(tile: &Tile) -> Result<Vec<u8>, PayloadError> {
-    let bytes: Vec<u8> = tile.cells().iter().flat_map(|cell| cell.to_le_bytes()).collect();
-    zstd::bulk::compress(&bytes, ZSTD_LEVEL).map_err(|e| PayloadError::Zstd(e.to_string()))
+    zstd::bulk::compress(&bytes(tile), ZSTD_LEVEL).map_err(|e| PayloadError::Zstd(e.to_string()))
 }
 
 /// The tile of a column.

@@ -7,7 +7,7 @@ use uuid::Uuid;
 
 use super::{ActRow, TABLE, parse_kind};
 use crate::store::revision_list;
-use crate::store::row::{corrupt, count, get};
+use crate::store::row::{corrupt, count, get, next_page};
 use crate::store::transaction::Tx;
 use crate::store::values::{Bulk, bulk_in};
 use crate::store::{Store, StoreError};
@@ -55,9 +55,7 @@ impl Store {
             .fetch_all(self.reads())
             .await?;
         let mut reverts = rows.iter().map(describe).collect::<Result<Vec<_>, _>>()?;
-        let more = reverts.len() > limit as usize;
-        reverts.truncate(limit as usize);
-        let next = reverts.last().filter(|_| more).map(|last| last.revision.to_string());
+        let next = next_page(&mut reverts, limit, |last| last.revision);
         Ok(v1::RevertPage { reverts, next })
     }
 
