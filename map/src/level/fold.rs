@@ -107,6 +107,8 @@ impl Level {
         contributions: impl IntoIterator<Item = &'a Contribution>,
     ) -> Self {
         let mut level = Self::new(config);
+        // Oldest first: what lies below the newest slice is then read once for each.
+        let sums: BTreeMap<SliceKey, Tile> = sums.into_iter().collect();
         for (SliceKey { key, slice }, tile) in sums {
             let stack = level.stacks.entry(key).or_default();
             stack.change(slice, config.slices, |sums| *sums = tile);
