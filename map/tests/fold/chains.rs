@@ -242,7 +242,14 @@ fn strewn(seed: u64, count: u64) -> Vec<Contribution> {
         .collect()
 }
 
+/// Whether two edges cross. Pieces of one wall lie on one line, where sides are chance: they cross only
+/// if their extents overlap.
 fn cross(a: (Point, Point), b: (Point, Point)) -> bool {
+    let (a_min, a_max) = (a.0.inf(&a.1), a.0.sup(&a.1));
+    let (b_min, b_max) = (b.0.inf(&b.1), b.0.sup(&b.1));
+    if (0..2).any(|i| a_max[i] < b_min[i] || b_max[i] < a_min[i]) {
+        return false;
+    }
     let side = |p: (Point, Point), q: Point| (p.1 - p.0).perp(&(q - p.0)) > 0.0;
     side(a, b.0) != side(a, b.1) && side(b, a.0) != side(b, a.1)
 }
@@ -261,7 +268,7 @@ fn assert_valid(level: &Level) {
             assert!(used.insert((edge.0.x.to_bits(), edge.0.y.to_bits(), edge.1.x.to_bits())));
             for (j, other) in ring[..edges].iter().enumerate().skip(i + 2) {
                 let touch = is_closed && i == 0 && j == edges - 1;
-                assert!(touch || !cross(*edge, *other), "{id:?} meets itself");
+                assert!(touch || !cross(*edge, *other), "{id:?} meets itself: {edge:?} {other:?}");
             }
         }
         let area = signed_area(&at(chain));
