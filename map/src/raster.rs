@@ -5,6 +5,7 @@ mod evidence;
 mod log_odds;
 mod slices;
 mod tile;
+mod together;
 
 pub(crate) use blocks::{Blocks, Touched};
 pub use evidence::{EvidencePatch, EvidenceRun, RunError, TilePatch};
@@ -12,6 +13,7 @@ pub use log_odds::LogOdds;
 pub(crate) use slices::Stack;
 pub use slices::{Slice, SliceConfig, SliceKey};
 pub use tile::{Cell, TILE_CELLS, TILE_SIDE, Tile, TileIndex, TileKey};
+pub use together::{Layered, Said, together};
 
 /// The kind of sensor that evidence comes from; each has layers of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -249,7 +249,7 @@ export interface paths {
          * @description All numbers are little-endian: the bytes `mft1`, the count of tiles (`u32`), and for each tile in
          *     the order of the request x (`i32`), y (`i32`), a length (`u32`) and so many bytes: zstd of its
          *     64 x 64 cells, row by row from below, each an `i32` of log-odds in 0.01 nat, not clamped. The
-         *     length is 0 where there is no evidence.
+         *     length is 0 where there is no evidence. Layers are read together as a single tile's are.
          */
         get: operations["read_raster_batch"];
         put?: never;
@@ -269,7 +269,8 @@ export interface paths {
         };
         /**
          * One tile's evidence: 64 x 64 cells, row by row from below, each a little-endian `i32` of
-         *     log-odds in 0.01 nat, not clamped. A tile without evidence is not found.
+         *     log-odds in 0.01 nat, not clamped. A tile without evidence is not found. Layers together are their
+         *     sum, but that sonar counts three tenths of itself in cells of which scanners say anything.
          */
         get: operations["read_raster_tile"];
         put?: never;
@@ -2237,7 +2238,7 @@ export interface operations {
                 mode?: "trinary" | "scale" | "raw";
                 /** @description `nav2`: `pgm` or `png`; `png` for mode scale and `pgm` for the others if absent. */
                 image?: "pgm" | "png";
-                /** @description `nav2`: `all` (the sum, the default), `scanner`, `sonar` or `prior`. */
+                /** @description `nav2`: `all` (together, the default), `scanner`, `sonar` or `prior`. */
                 layer?: "all" | "scanner" | "sonar" | "prior";
                 /** @description `nav2`: only the cells that touch this rectangle, `min_x,min_y,max_x,max_y` in metres. */
                 bbox?: string;
@@ -2571,7 +2572,7 @@ export interface operations {
             query: {
                 /** @description Places of tiles as `x,y,x,y,...`, at most 256. */
                 tiles: string;
-                /** @description `scanner`, `sonar`, `prior`, or `all`, the sum of these; the sum without the prior if absent. */
+                /** @description `scanner`, `sonar`, `prior`, or `all`, these together; without the prior if absent. */
                 layer?: "all" | "scanner" | "sonar" | "prior";
             };
             header?: never;
@@ -2613,9 +2614,9 @@ export interface operations {
     read_raster_tile: {
         parameters: {
             query?: {
-                /** @description The class of sensors; the sum of all, without the prior, if neither this nor `layer` is there. */
+                /** @description The class of sensors; all together, without the prior, if neither this nor `layer` is there. */
                 sensor?: "scanner" | "sonar";
-                /** @description Instead of `sensor`: `scanner`, `sonar`, `prior`, or `all`, the sum of these. */
+                /** @description Instead of `sensor`: `scanner`, `sonar`, `prior`, or `all`, these together. */
                 layer?: "all" | "scanner" | "sonar" | "prior";
             };
             header?: never;
@@ -2874,7 +2875,7 @@ export interface operations {
     read_picture: {
         parameters: {
             query?: {
-                /** @description `all` (the sum, the default), `scanner`, `sonar` or `prior`. */
+                /** @description `all` (together, the default), `scanner`, `sonar` or `prior`. */
                 layer?: "all" | "scanner" | "sonar" | "prior";
             };
             header?: never;

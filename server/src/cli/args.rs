@@ -202,7 +202,7 @@ pub(super) enum ImageName {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(super) enum LayerName {
-    /// The sum of all layers
+    /// All layers together
     All,
     /// What scanners saw
     Scanner,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use mapfold_map::level::LevelMap;
-use mapfold_map::raster::{SensorClass, Tile, TileIndex, TileKey};
+use mapfold_map::raster::{Layered, SensorClass, Tile, TileIndex, TileKey};
 
 /// One layer of a level's raster.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -23,7 +23,7 @@ impl LayerId {
 /// Which evidence is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Layer {
-    /// The sum of all layers.
+    /// All layers together.
     All,
     /// One layer alone.
     Only(LayerId),
@@ -35,7 +35,7 @@ impl Layer {
         self == Self::All || self == Self::Only(id)
     }
 
-    /// The layers that are summed, in their canonical order.
+    /// The layers that are read, in their canonical order.
     pub fn parts(self) -> impl Iterator<Item = LayerId> {
         LayerId::ALL.into_iter().filter(move |id| self.shows(*id))
     }
@@ -63,6 +63,30 @@ pub trait Dated: Raster {
 
     /// Where something has changed after revision `since`, in no order; a place may come twice.
     fn changed_after(&self, since: i64) -> Box<dyn Iterator<Item = (LayerId, TileIndex)> + '_>;
+}
+
+/// The tiles of one place, to be read together.
+pub fn layered<'a>(tiles: impl IntoIterator<Item = (LayerId, &'a Tile)>) -> Layered<'a> {
+    let mut layered = Layered::default();
+    for (layer, tile) in tiles {
+        let place = match layer {
+            LayerId::Sensor(SensorClass::Scanner) => &mut layered.scanner,
+            LayerId::Sensor(SensorClass::Sonar) => &mut layered.sonar,
+            LayerId::Prior => &mut layered.prior,
+        };
+        *place = Some(tile);
+    }
+    layered
+}
+
+/// What a raster holds of some layers in one place, to be read together.
+pub fn layered_at(
+    raster: &(impl Raster + ?Sized),
+    at: TileIndex,
+    parts: impl IntoIterator<Item = LayerId>,
+) -> Layered<'_> {
+    let tile = |part| raster.between(part, at, at).next().map(|(_, tile)| (part, tile.as_ref()));
+    layered(parts.into_iter().filter_map(tile))
 }
 
 /// What robots saw; a map knows of no prior.

@@ -9,8 +9,9 @@ use super::access::{LevelFor, Read};
 use super::answer::Reader;
 use super::problem::ApiError;
 use super::query::QueryOf;
-use super::raster::{parts, sums};
+use super::raster::parts;
 use super::tiles::LayerName;
+use crate::exchange::layers::layered_at;
 use crate::store::tile_cells;
 
 /// Media type of a batch. Its tiles are packed already, so it is not packed again.
@@ -29,7 +30,7 @@ pub(super) struct BatchQuery {
     #[serde(deserialize_with = "places")]
     #[param(value_type = String)]
     tiles: Vec<TileIndex>,
-    /// `scanner`, `sonar`, `prior`, or `all`, the sum of these; the sum without the prior if absent.
+    /// `scanner`, `sonar`, `prior`, or `all`, these together; without the prior if absent.
     #[param(inline)]
     layer: Option<LayerName>,
 }
@@ -55,7 +56,7 @@ fn parse(text: &str) -> Option<Vec<TileIndex>> {
 /// All numbers are little-endian: the bytes `mft1`, the count of tiles (`u32`), and for each tile in
 /// the order of the request x (`i32`), y (`i32`), a length (`u32`) and so many bytes: zstd of its
 /// 64 x 64 cells, row by row from below, each an `i32` of log-odds in 0.01 nat, not clamped. The
-/// length is 0 where there is no evidence.
+/// length is 0 where there is no evidence. Layers are read together as a single tile's are.
 #[utoipa::path(
     get, path = route::RASTER_BATCH, operation_id = "read_raster_batch", tag = "map",
     params(("site" = String, Path), ("level" = String, Path), BatchQuery),
@@ -77,7 +78,8 @@ pub(super) async fn read(
         let mut batch = MAGIC.to_vec();
         batch.extend((query.tiles.len() as u32).to_le_bytes());
         for at in query.tiles {
-            let packed = sums(&*snapshot, at, &parts).map(|tile| tile_cells::encode(&tile));
+            let read = layered_at(&*snapshot, at, parts.iter().copied()).together();
+            let packed = read.map(|tile| tile_cells::encode(&tile));
             let packed = packed.transpose()?.unwrap_or_default();
             batch.extend(at.x.to_le_bytes());
             batch.extend(at.y.to_le_bytes());

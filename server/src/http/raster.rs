@@ -2,7 +2,7 @@
 
 use axum::extract::Path;
 use axum::response::Response;
-use mapfold_map::raster::{Tile, TileIndex};
+use mapfold_map::raster::TileIndex;
 use mapfold_schema::v1::{RasterChanges, SensorClass};
 use mapfold_schema::{codec, route};
 use serde::Deserialize;
@@ -12,7 +12,7 @@ use super::answer::{DATA, Reader, Tag};
 use super::problem::ApiError;
 use super::query::{QueryOf, SinceInBox};
 use super::tiles::LayerName;
-use crate::exchange::layers::{Layer, LayerId, Raster};
+use crate::exchange::layers::{Layer, LayerId, layered_at};
 use crate::store::tile_cells;
 
 const BINARY: &str = "application/octet-stream";
@@ -49,16 +49,17 @@ pub(super) async fn changes(
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(super) struct TileQuery {
-    /// The class of sensors; the sum of all, without the prior, if neither this nor `layer` is there.
+    /// The class of sensors; all together, without the prior, if neither this nor `layer` is there.
     #[param(inline)]
     sensor: Option<SensorClass>,
-    /// Instead of `sensor`: `scanner`, `sonar`, `prior`, or `all`, the sum of these.
+    /// Instead of `sensor`: `scanner`, `sonar`, `prior`, or `all`, these together.
     #[param(inline)]
     layer: Option<LayerName>,
 }
 
 /// One tile's evidence: 64 x 64 cells, row by row from below, each a little-endian `i32` of
-/// log-odds in 0.01 nat, not clamped. A tile without evidence is not found.
+/// log-odds in 0.01 nat, not clamped. A tile without evidence is not found. Layers together are their
+/// sum, but that sonar counts three tenths of itself in cells of which scanners say anything.
 #[utoipa::path(
     get, path = route::RASTER_TILE, operation_id = "read_raster_tile", tag = "map",
     params(
@@ -89,30 +90,17 @@ pub(super) async fn tile(
     let missing = || ApiError::not_found("tile", format!("{x}/{y}"));
     let (Ok(x_index), Ok(y_index)) = (x.parse(), y.parse()) else { return Err(missing()) };
     let tile = TileIndex { x: x_index, y: y_index };
-    let sums = sums(&*level.level.snapshot(), tile, &parts).ok_or_else(missing)?;
-    let bytes = tile_cells::bytes(&sums);
+    let snapshot = level.level.snapshot();
+    let read = layered_at(&*snapshot, tile, parts).together().ok_or_else(missing)?;
+    let bytes = tile_cells::bytes(&read);
     let tag = Tag::of_bytes(&bytes);
     Ok(reader.bytes(media_type, &tag, || bytes))
 }
 
-/// The layers of which evidence is summed: those of robots, if none is named.
+/// The layers that are read together: those of robots, if none is named.
 pub(super) fn parts(layer: Option<LayerName>) -> Vec<LayerId> {
     match layer {
         Some(layer) => Layer::from(layer).parts().collect(),
         None => Layer::All.parts().filter(|part| *part != LayerId::Prior).collect(),
     }
-}
-
-/// The cells of the sum of some layers; `None` without evidence.
-pub(super) fn sums(raster: &impl Raster, at: TileIndex, parts: &[LayerId]) -> Option<Tile> {
-    let mut sums: Option<Tile> = None;
-    for part in parts {
-        for (_, tile) in raster.between(*part, at, at) {
-            match &mut sums {
-                None => sums = Some(tile.as_ref().clone()),
-                Some(sums) => sums.add_tile(tile),
-            }
-        }
-    }
-    sums
 }

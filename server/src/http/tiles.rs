@@ -44,7 +44,7 @@ impl Dated for Snapshot {
 #[derive(Debug, Clone, Copy, Default, Deserialize, utoipa::ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum LayerName {
-    /// The sum of all.
+    /// All together.
     #[default]
     All,
     /// Scanners alone.
@@ -60,7 +60,7 @@ pub(super) enum LayerName {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(super) struct PictureQuery {
-    /// `all` (the sum, the default), `scanner`, `sonar` or `prior`.
+    /// `all` (together, the default), `scanner`, `sonar` or `prior`.
     #[serde(default)]
     #[param(inline)]
     layer: LayerName,

@@ -2,14 +2,14 @@
 
 use std::io::{self, Write};
 
-use mapfold_map::raster::{LogOdds, TILE_SIDE, TileIndex};
+use mapfold_map::raster::{LogOdds, TILE_SIDE, TileIndex, together};
 use mapfold_schema::v1::Bounds;
 
 use super::cells::UNKNOWN as UNKNOWN_VALUE;
 use super::description::Description;
 use super::image::ImageFormat;
 use super::{Mode, pgm, png_image};
-use crate::exchange::layers::{Layer, Raster};
+use crate::exchange::layers::{Layer, Raster, layered_at};
 
 /// Most pixels of an image: 1.6 km by 1.6 km at 10 cm, and what readers still load.
 pub const PIXELS_MAX: u64 = 16_384 * 16_384;
@@ -24,8 +24,6 @@ const OCCUPIED: u8 = 0;
 const UNKNOWN: u8 = 205;
 /// Of raw images: nothing is known.
 const RAW_UNKNOWN: u8 = 255;
-/// No evidence in any layer.
-const NOTHING: i64 = i64::MIN;
 
 /// Why a map has no image.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -192,17 +190,17 @@ impl<'a> Nav2Map<'a> {
     fn write_rows(&self, to: &mut impl Write) -> io::Result<()> {
         let Window { bottom, columns, rows, .. } = self.window;
         let greys = Greys::new(self.style.mode);
-        let mut band = vec![NOTHING; columns * TILE_SIDE];
+        let mut band = vec![None; columns * TILE_SIDE];
         let mut line = Vec::with_capacity(columns * 2);
         let above = bottom + rows as i64;
         for tile_row in (bottom.div_euclid(SIDE)..=(above - 1).div_euclid(SIDE)).rev() {
-            self.sum_tile_row(tile_row, &mut band);
+            self.read_tile_row(tile_row, &mut band);
             let lowest = tile_row * SIDE;
             for row in (lowest.max(bottom)..(lowest + SIDE).min(above)).rev() {
                 let start = (row - lowest) as usize * columns;
                 line.clear();
-                for sum in &band[start..start + columns] {
-                    greys.write(*sum, &mut line);
+                for read in &band[start..start + columns] {
+                    greys.write(*read, &mut line);
                 }
                 to.write_all(&line)?;
             }
@@ -210,26 +208,25 @@ impl<'a> Nav2Map<'a> {
         Ok(())
     }
 
-    /// Sums the layers of one row of tiles, row by row of cells from below.
-    fn sum_tile_row(&self, tile_row: i64, band: &mut [i64]) {
-        band.fill(NOTHING);
+    /// Reads the layers of one row of tiles together, row by row of cells from below.
+    fn read_tile_row(&self, tile_row: i64, band: &mut [Option<LogOdds>]) {
+        band.fill(None);
         let Window { left, columns, .. } = self.window;
         let right = left + columns as i64;
         for tile_column in left.div_euclid(SIDE)..=(right - 1).div_euclid(SIDE) {
             let Some(tile) = tile_at(tile_column, tile_row) else { continue };
             let first = tile_column * SIDE;
             let (from, to) = (left.max(first), right.min(first + SIDE));
-            for layer in self.layer.parts() {
-                for (_, cells) in self.raster.between(layer, tile, tile) {
-                    for (row, cells) in cells.cells().chunks_exact(TILE_SIDE).enumerate() {
-                        let start = row * columns + (from - left) as usize;
-                        let sums = &mut band[start..start + (to - from) as usize];
-                        let cells = &cells[(from - first) as usize..(to - first) as usize];
-                        for (sum, cell) in sums.iter_mut().zip(cells).filter(|(_, c)| **c != 0) {
-                            let before = if *sum == NOTHING { 0 } else { *sum };
-                            *sum = before + i64::from(*cell);
-                        }
-                    }
+            let layers = layered_at(self.raster, tile, self.layer.parts());
+            if layers.is_empty() {
+                continue;
+            }
+            for row in 0..TILE_SIDE {
+                let start = row * columns + (from - left) as usize;
+                let cells = row * TILE_SIDE + (from - first) as usize;
+                let cells = cells..cells + (to - from) as usize;
+                for (read, said) in band[start..].iter_mut().zip(layers.said(cells)) {
+                    *read = together(said);
                 }
             }
         }
@@ -319,51 +316,47 @@ impl Window {
 /// The greys of evidence: by log-odds step, so that no cell needs an exponential.
 struct Greys {
     mode: Mode,
-    occupied_from: i64,
-    free_to: i64,
+    occupied_from: i32,
+    free_to: i32,
     /// Occupancy in per cent of each step within what is read.
     values: Vec<u8>,
 }
 
 /// Values beyond this many log-odds steps read like this many.
-const READ_LIMIT: i64 = (LogOdds::READ_LIMIT_NAT * LogOdds::STEPS_PER_NAT) as i64;
+const READ_LIMIT: i32 = (LogOdds::READ_LIMIT_NAT * LogOdds::STEPS_PER_NAT) as i32;
 
 impl Greys {
     fn new(mode: Mode) -> Self {
         let steps = |p: f64| (p / (1.0 - p)).ln() * LogOdds::STEPS_PER_NAT;
         // As sure as reading gets is 100 or 0: readers take nothing less for an obstacle.
-        let p = |step: i64| LogOdds(step as i32).probability();
+        let p = |step| LogOdds(step).probability();
         let (least, most) = (p(-READ_LIMIT), p(READ_LIMIT));
         let value = |step| ((p(step) - least) / (most - least) * 100.0).round() as u8;
         Self {
             mode,
-            occupied_from: steps(OCCUPIED_THRESH).ceil() as i64,
-            free_to: steps(FREE_THRESH).floor() as i64,
+            occupied_from: steps(OCCUPIED_THRESH).ceil() as i32,
+            free_to: steps(FREE_THRESH).floor() as i32,
             values: (-READ_LIMIT..=READ_LIMIT).map(value).collect(),
         }
     }
 
-    fn trinary(&self, sum: i64) -> u8 {
-        if sum >= self.occupied_from {
-            OCCUPIED
-        } else if sum <= self.free_to && sum != NOTHING {
-            FREE
-        } else {
-            UNKNOWN
+    fn trinary(&self, read: Option<LogOdds>) -> u8 {
+        match read {
+            Some(LogOdds(step)) if step >= self.occupied_from => OCCUPIED,
+            Some(LogOdds(step)) if step <= self.free_to => FREE,
+            _ => UNKNOWN,
         }
     }
 
     /// Occupancy in per cent, or -1.
-    fn value(&self, sum: i64) -> i8 {
-        if sum == NOTHING {
-            return UNKNOWN_VALUE;
-        }
-        self.values[(sum.clamp(-READ_LIMIT, READ_LIMIT) + READ_LIMIT) as usize] as i8
+    fn value(&self, read: Option<LogOdds>) -> i8 {
+        let Some(LogOdds(step)) = read else { return UNKNOWN_VALUE };
+        self.values[(step.clamp(-READ_LIMIT, READ_LIMIT) + READ_LIMIT) as usize] as i8
     }
 
-    fn write(&self, sum: i64, line: &mut Vec<u8>) {
-        match (self.mode, self.value(sum)) {
-            (Mode::Trinary, _) => line.push(self.trinary(sum)),
+    fn write(&self, read: Option<LogOdds>, line: &mut Vec<u8>) {
+        match (self.mode, self.value(read)) {
+            (Mode::Trinary, _) => line.push(self.trinary(read)),
             (Mode::Raw, value) => line.push(u8::try_from(value).unwrap_or(RAW_UNKNOWN)),
             (Mode::Scale, UNKNOWN_VALUE) => line.extend([UNKNOWN, 0]),
             (Mode::Scale, value) => {

@@ -3,9 +3,10 @@
 //! The shades of each kind of evidence grow darker with the probability of an obstacle, in any
 //! colour vision; obstacles of different kinds can be told apart in any.
 
-use mapfold_map::raster::{LogOdds, SensorClass, TILE_CELLS, TILE_SIDE, Tile};
+use mapfold_map::raster::{LogOdds, Said, SensorClass, TILE_CELLS, TILE_SIDE, Tile, together};
 
 use super::{LayerId, PICTURE_SIDE};
+use crate::exchange::layers::layered;
 
 /// Steps from certainly free to certainly occupied.
 const STEPS: u8 = 16;
@@ -31,6 +32,16 @@ fn ramp(layer: LayerId) -> u8 {
         LayerId::Sensor(SensorClass::Sonar) => 1,
         LayerId::Prior => 2,
     }
+}
+
+/// The ramp of a cell of which several layers may speak: that of the first.
+fn first_to_speak(said: Said) -> u8 {
+    let layer = match said {
+        Said { scanner: LogOdds(0), sonar: LogOdds(0), .. } => LayerId::Prior,
+        Said { scanner: LogOdds(0), .. } => LayerId::Sensor(SensorClass::Sonar),
+        Said { .. } => LayerId::Sensor(SensorClass::Scanner),
+    };
+    ramp(layer)
 }
 
 /// The step of each value of evidence, so that no cell needs an exponential.
@@ -60,9 +71,8 @@ impl Default for Shading {
 }
 
 impl Shading {
-    fn step(&self, value: i64) -> u8 {
-        let clamped = value.clamp(i64::from(-READ_LIMIT), i64::from(READ_LIMIT));
-        self.steps[(clamped + i64::from(READ_LIMIT)) as usize]
+    fn step(&self, value: i32) -> u8 {
+        self.steps[(value.clamp(-READ_LIMIT, READ_LIMIT) + READ_LIMIT) as usize]
     }
 
     /// The shades of the layers of one place.
@@ -121,8 +131,8 @@ impl Shading {
             if least == i32::MAX && most == i32::MIN {
                 continue;
             }
-            let surest = self.step(i64::from(most));
-            let step = if surest >= OCCUPIED_FROM { surest } else { self.step(i64::from(least)) };
+            let surest = self.step(most);
+            let step = if surest >= OCCUPIED_FROM { surest } else { self.step(least) };
             *shade = 1 + ramp * STEPS + step;
         }
     }
@@ -132,22 +142,15 @@ impl Shading {
             // By far the most: no sums, and nothing to choose between.
             let first = 1 + ramp(*layer) * STEPS;
             for (shade, value) in shades.iter_mut().zip(tile.cells()) {
-                let step = first + self.step(i64::from(*value));
+                let step = first + self.step(*value);
                 *shade = if *value == 0 { UNKNOWN } else { step };
             }
             return;
         }
-        for (cell, shade) in shades.iter_mut().enumerate() {
-            let (mut sum, mut hue) = (0, None);
-            for (layer, tile) in layers {
-                let value = tile.cells()[cell];
-                sum += i64::from(value);
-                if value != 0 {
-                    hue = Some(hue.map_or(ramp(*layer), |hue: u8| hue.min(ramp(*layer))));
-                }
-            }
-            if let Some(hue) = hue {
-                *shade = 1 + self.step(sum) + hue * STEPS;
+        let layers = layered(layers.iter().copied());
+        for (shade, said) in shades.iter_mut().zip(layers.said(0..TILE_CELLS)) {
+            if let Some(LogOdds(read)) = together(said) {
+                *shade = 1 + first_to_speak(said) * STEPS + self.step(read);
             }
         }
     }

@@ -134,6 +134,17 @@ fn sonar_has_its_own_hue_only_where_no_scanner_speaks() {
 }
 
 #[test]
+fn what_a_scanner_saw_is_not_washed_away_by_sonar() {
+    let map = map_of(&[(SCANNER, 0, -1, 250), (SONAR, 0, -1, -600), (SONAR, 1, -1, -600)]);
+    for z in [6, 4] {
+        let all = drawn(&map, z, 0, 0, Layer::All);
+        assert!(all[0][0] < 0x80, "the wall is {:?} at zoom {z}", all[0]);
+    }
+    assert!(drawn(&map, 6, 0, 0, Layer::All)[1][0] > 0xe0, "free where only sonar looked");
+    assert!(drawn(&map, 6, 0, 0, Layer::Only(LayerId::Sensor(SONAR)))[0][0] > 0xe0);
+}
+
+#[test]
 fn where_nothing_is_known_the_picture_is_transparent_however_far_out() {
     let map = map_of(&[(SCANNER, 0, 0, 300)]);
     for (z, row, col) in [(6, 5, 5), (0, i32::MIN, i32::MAX), (8, i32::MAX, i32::MIN)] {

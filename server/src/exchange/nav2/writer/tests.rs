@@ -50,9 +50,9 @@ fn greys_change_exactly_at_the_thresholds_that_the_yaml_names() {
         } else {
             UNKNOWN
         };
-        assert_eq!(greys.trinary(i64::from(steps)), expected, "at {steps} steps, p = {p}");
+        assert_eq!(greys.trinary(Some(LogOdds(steps))), expected, "at {steps} steps, p = {p}");
     }
-    assert_eq!(greys.trinary(NOTHING), UNKNOWN);
+    assert_eq!(greys.trinary(None), UNKNOWN);
 }
 
 #[test]
@@ -62,10 +62,10 @@ fn an_unknown_pixel_stays_unknown_when_it_is_read_back() {
 }
 
 #[test]
-fn rows_are_flipped_and_layers_summed_or_told_apart() {
-    // Lower left cell: 40 + 40 steps is occupied together, but neither alone.
+fn rows_are_flipped_and_layers_read_together_or_told_apart() {
+    // Lower left cell: 50 steps and three tenths of 50 is occupied, but neither alone.
     let map =
-        map_of(&[(SCANNER, -1, 0, &[(0, 40), (TILE_CELLS - 1, -300)]), (SONAR, -1, 0, &[(0, 40)])]);
+        map_of(&[(SCANNER, -1, 0, &[(0, 50), (TILE_CELLS - 1, -300)]), (SONAR, -1, 0, &[(0, 50)])]);
     let nav2 = all(&map);
     assert!(nav2.description("map.pgm").to_string().contains("origin: [-3.2, 0.0, 0.0]\n"));
     let mut bytes = Vec::new();
