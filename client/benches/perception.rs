@@ -103,14 +103,13 @@ fn evidence(c: &mut Criterion) {
     let mut group = c.benchmark_group("evidence");
     for (beams, increment) in [(180, 1.0), (1081, 0.25)] {
         let scans = scans(beams, increment);
-        let usable = vec![true; beams];
         let mut i = 0;
         group.bench_function(BenchmarkId::from_parameter(beams), |b| {
             b.iter(|| {
                 i = (i + 1) % scans.len();
                 scanner_evidence(
                     black_box(&scans[i]),
-                    &usable,
+                    |_| true,
                     &profile,
                     &pose,
                     0.05,

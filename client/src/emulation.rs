@@ -92,6 +92,7 @@ pub fn emulate(
         .map(|robot_from_sonar| Sonar {
             robot_from_sensor: robot_from_sonar,
             range: nearest_echo(&returns, &robot_from_sonar, profile, config, chance),
+            is_steady: true,
         })
         .collect();
     Ring { cone: profile.cone_rad, sonars }

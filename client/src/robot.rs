@@ -19,8 +19,10 @@ pub use identity::Identity;
 pub use look::Look;
 pub use odometry::{DeadReckoning, OdometryNoise};
 
+pub use crate::evidence::SonarVerdicts;
+
 use crate::emulation::EmulationConfig;
-use crate::evidence::{Canvas, ScannerEvidenceConfig, SonarEvidenceConfig};
+use crate::evidence::{Canvas, KnownWalls, ScannerEvidenceConfig, SonarEvidenceConfig};
 use crate::log::{Observation, Reading};
 use crate::perception::Extractor;
 use crate::sensor::{ScannerProfile, Sensors, SonarProfile};
@@ -218,6 +220,16 @@ impl Surveyor {
         reading: &Reading,
         level_from_robot: UncertainPose<Level, Robot>,
     ) -> Look {
+        self.observe_among(reading, level_from_robot, None)
+    }
+
+    /// What the robot saw from there, among walls that it knows already: from its mirror, say.
+    pub fn observe_among(
+        &mut self,
+        reading: &Reading,
+        level_from_robot: UncertainPose<Level, Robot>,
+        walls: Option<&dyn KnownWalls>,
+    ) -> Look {
         let mut contribution = Contribution {
             id: self.id(reading),
             robot: Arc::clone(&self.robot),
@@ -231,8 +243,8 @@ impl Surveyor {
             clusters: Vec::new(),
             evidence: Vec::new(),
         };
-        look::fill(self, reading, &mut contribution);
-        Look { contribution, emulated: self.emulation.is_some() }
+        let sonar = look::fill(self, reading, walls, &mut contribution);
+        Look { contribution, emulated: self.emulation.is_some(), sonar }
     }
 
     /// [`Self::locate`] and [`Self::observe`] in one.

@@ -8,9 +8,11 @@ mod room;
 use std::alloc::System;
 use std::path::PathBuf;
 
+use mapfold_client::evidence::{Canvas, ScannerEvidenceConfig, scanner_evidence};
 use mapfold_client::log::{Observation, carmen};
 use mapfold_client::perception::Extractor;
 use mapfold_client::sensor::{Scan, ScannerProfile, preset};
+use mapfold_map::geometry::{Covariance, Pose, UncertainPose};
 use mapfold_schema::v1::RangeCorrection;
 use room::{Chance, Room};
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
@@ -87,6 +89,23 @@ fn pass(extractor: &mut Extractor, scans: &[Scan]) -> (usize, [usize; 3]) {
     (stats.allocations + stats.reallocations, found)
 }
 
+/// Evidence of all scans: allocations meanwhile, and tiles in the patches.
+fn evidence(canvas: &mut Canvas, profile: &ScannerProfile, scans: &[Scan]) -> (usize, usize) {
+    let level_from_robot =
+        UncertainPose { pose: Pose::new(3.3, -1.7, 0.3), covariance: Covariance::zero() };
+    let config = ScannerEvidenceConfig::STANDARD;
+    let mut tiles = 0;
+    let region = Region::new(ALLOCATOR);
+    for scan in scans {
+        let is_return = |beam: usize| scan.is_return(scan.ranges[beam]);
+        let patch =
+            scanner_evidence(scan, is_return, profile, &level_from_robot, 0.05, &config, canvas);
+        tiles += patch.tiles.len();
+    }
+    let stats = region.change();
+    (stats.allocations + stats.reallocations, tiles)
+}
+
 /// One test, for whatever runs beside it would be counted too.
 #[test]
 fn after_the_first_pass_over_scans_nothing_is_allocated() {
@@ -125,5 +144,15 @@ fn after_the_first_pass_over_scans_nothing_is_allocated() {
                 new.len()
             );
         }
+    }
+    // What evidence allocates is the patch that it gives away: its runs tile by tile, and the map of tiles.
+    for scans in [&simulated, &recorded] {
+        let profile = preset("sick-lms").and_then(|s| s.scanner).unwrap();
+        let mut canvas = Canvas::default();
+        evidence(&mut canvas, &profile, scans);
+        let (allocations, tiles) = evidence(&mut canvas, &profile, scans);
+        assert!(tiles > 10 * scans.len() / 4, "{tiles} tiles");
+        assert!(allocations <= 2 * tiles + 8 * scans.len(), "{allocations} for {tiles} tiles");
+        assert_eq!(evidence(&mut canvas, &profile, scans), (allocations, tiles));
     }
 }

@@ -182,6 +182,8 @@ fn in_words(report: &Report) -> String {
     let cut_short = report.cut_short.as_ref().map(|reason| {
         format!("the log is cut short ({reason}), so what came after is missing from the map")
     });
-    let all: Vec<String> = [outcome, cost].into_iter().chain(passed).chain(cut_short).collect();
+    let sonar = report.sonar.in_words();
+    let all: Vec<String> =
+        [outcome, cost].into_iter().chain(passed).chain(sonar).chain(cut_short).collect();
     format!("{robot}: {}", all.join("; "))
 }

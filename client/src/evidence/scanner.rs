@@ -1,12 +1,24 @@
-//! Evidence from a scanner: free along the beam, a Gaussian bump where it ended, nothing behind.
+//! Evidence from a scanner: free up to where the beams ended, a Gaussian bump there, nothing behind.
+//!
+//! What one beam by itself says of a cell is [`beam_evidence`]. A scan's beams together free what lies
+//! inside of the outline of their ends, each cell once: ray by ray, the cells before the scanner
+//! would be visited a hundred times and those between far beams never.
 
-use mapfold_map::geometry::{Level, Point, Robot, UncertainPose, unit_normal};
+mod fan;
+mod rings;
+
+use mapfold_map::geometry::{Level, Point, Robot, UncertainPose};
 use mapfold_map::raster::{EvidencePatch, LogOdds, SensorClass};
-use nalgebra::RowVector3;
+use nalgebra::Matrix3;
 
 use super::Canvas;
+use super::outline::{corner, fixed, whole};
 use super::walk::walk;
 use crate::sensor::{Scan, ScannerProfile};
+
+pub(super) use fan::Fan;
+use fan::Sheaf;
+use rings::Rings;
 
 /// How beams become evidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,15 +29,26 @@ pub struct ScannerEvidenceConfig {
     pub occupied_nat: f64,
     /// Beams are believed up to here, metres: further out neighbouring beams are half a metre apart.
     pub range_believed: f64,
+    /// Width of the least thing that two neighbouring beams cannot both miss by chance, metres. Where
+    /// they are farther apart, what lies between them is free by so much less.
+    pub missed_width: f64,
     /// Where the heading's error moves a beam sideways by more than this many cells, it counts half;
     /// beyond twice as many, not at all.
     pub sideways_cells: f64,
+    /// Evidence is rounded to this, in log-odds steps: coarser, it travels in longer runs.
+    pub step: LogOdds,
 }
 
 impl ScannerEvidenceConfig {
     /// The defaults.
-    pub const STANDARD: Self =
-        Self { free_nat: -0.4, occupied_nat: 0.85, range_believed: 30.0, sideways_cells: 2.0 };
+    pub const STANDARD: Self = Self {
+        free_nat: -0.4,
+        occupied_nat: 0.85,
+        range_believed: 30.0,
+        missed_width: 0.1,
+        sideways_cells: 2.0,
+        step: LogOdds(10),
+    };
 }
 
 /// Evidence of one beam of range `z` for a cell at distance `d`, `sd` being the deviation of their
@@ -44,7 +67,7 @@ pub fn beam_evidence(
 ) -> (f64, f64) {
     let before = (z - d) / sd;
     let free = config.free_nat * (before - 1.0).clamp(0.0, 1.0);
-    if before.abs() > 2.0 {
+    if before.abs() > BUMP_SDS {
         return (free, 0.0);
     }
     let spread = resolution / (sd * std::f64::consts::TAU.sqrt());
@@ -52,61 +75,143 @@ pub fn beam_evidence(
     (free, occupied)
 }
 
+/// Half the support of the bump, standard deviations.
+const BUMP_SDS: f64 = 2.0;
+/// Where the outline of what is free runs before the hit, standard deviations: halfway down the
+/// ramp of [`beam_evidence`].
+const OUTLINE_SDS: f64 = 1.5;
+/// Beams farther apart than this, radians, are no fan: what lies between them was not looked at.
+const FAN_INCREMENT_MAX: f64 = 0.1;
+/// Variance of a place that may be anywhere in a cell, in squares of cells.
+const CELL_VARIANCE: f64 = 1.0 / 12.0;
+/// Places farther from the level's origin than this, in cells, are in no level.
+const CELLS_MAX: f64 = 1e8;
+
 /// The evidence of one scan. `usable` says beam by beam whether the reading passed the
 /// plausibility checks; beams that are not usable, and those without return, say nothing.
+///
+/// It says what [`beam_evidence`] says of the cells that every beam crosses, hits before free and free
+/// once a look: of 97 % of these cells to within 0.45 nat, of 85 % to within 0.2, of all free and all
+/// occupied cells together to within 12 % (`tests/tests/raster.rs`). The rest lies at borders: a cell is free
+/// if the outline holds its centre, not if a ray grazes it. Cells between beams are freed too.
 pub fn scanner_evidence(
     scan: &Scan,
-    usable: &[bool],
+    usable: impl Fn(usize) -> bool,
     profile: &ScannerProfile,
     level_from_robot: &UncertainPose<Level, Robot>,
     resolution: f64,
     config: &ScannerEvidenceConfig,
     canvas: &mut Canvas,
 ) -> EvidencePatch {
+    let grades = Rings::grades(config);
     let pose = &level_from_robot.pose;
     let level_from_sensor = pose.compose(&scan.robot_from_sensor);
-    let start = level_from_sensor.position();
-    let heading_sd = level_from_robot.covariance.sd(2);
-    let cell_variance = resolution * resolution / 12.0;
-    let full_to = config.sideways_cells * resolution / heading_sd.max(1e-9);
-    let far = config.range_believed.min(2.0 * full_to);
-    for (beam, z) in scan.ranges.iter().enumerate() {
-        if !usable.get(beam).is_some_and(|usable| *usable) {
-            continue;
-        }
-        let bearing = level_from_sensor.heading() + scan.geometry.bearing(beam);
-        let direction = unit_normal(bearing);
-        // The pose's error along the beam: its position projected, and its heading by the lever
-        // of the scanner's place on the robot.
-        let along = j_along_pose(&direction, &(start - pose.position()));
-        let pose_variance = level_from_robot.covariance.transformed(&along).matrix()[(0, 0)];
-        let range_sd = profile.range_sd(*z);
-        let variance = range_sd * range_sd
-            + profile.systematic_sd_m * profile.systematic_sd_m
-            + pose_variance.max(0.0)
-            + cell_variance;
-        let sd = variance.sqrt();
-        walk(&start, &direction, (z + 2.0 * sd).min(far), resolution, |cell, from, to| {
-            let d = 0.5 * (from + to);
-            let weight = if d > full_to { 0.5 } else { 1.0 };
-            let (free, occupied) = beam_evidence(d, *z, sd, resolution, config);
-            if free < 0.0 {
-                canvas.free_once(cell, (weight * free) as f32);
-            }
-            if occupied > 0.0 {
-                // A cell that the ray only grazes gets its share.
-                let share = ((to - from) / resolution).min(1.0);
-                canvas.hit(cell, (weight * share * occupied) as f32);
-            }
-        });
+    // From here on in cells.
+    let start = level_from_sensor.position() / resolution;
+    if start.norm().is_nan() || start.norm() > CELLS_MAX {
+        return canvas.take(SensorClass::Scanner, config.step, grades);
     }
-    canvas.take(SensorClass::Scanner, LogOdds(1))
+    let rings = Rings::new(scan, level_from_robot.covariance.sd(2), resolution, config);
+    let per_metre = resolution.recip();
+    let mut fan = std::mem::take(&mut canvas.fan);
+    fan.bumps.make(config.occupied_nat);
+    fan.gather(scan, usable, per_metre);
+    let arm = level_from_sensor.position() - pose.position();
+    let covariance = level_from_robot.covariance.matrix();
+    let constant =
+        profile.range_sd_m * profile.range_sd_m + profile.systematic_sd_m * profile.systematic_sd_m;
+    fan.aim(level_from_sensor.heading(), rings.far, |z, direction| {
+        let growth = profile.range_sd_per_m * z * resolution;
+        let along = variance_along(direction, &arm, covariance).max(0.0);
+        (constant + growth * growth + along) * per_metre * per_metre + CELL_VARIANCE
+    });
+    fan.draw_back();
+    let (low, high) = fan.bounds(&start);
+    if let Some((low, rows)) = canvas.begin(low, high) {
+        let start = start - Point::new(f64::from(low.column), f64::from(low.row));
+        free(&fan, &rings, start, rows, canvas);
+        hit(&fan, &rings, start, canvas);
+    }
+    canvas.fan = fan;
+    canvas.take(SensorClass::Scanner, config.step, grades)
 }
 
-/// d(place of the scanner along `direction`) / d(x, y, heading) of the robot, `arm` leading from
-/// the robot to the scanner in the level frame.
-fn j_along_pose(direction: &Point, arm: &Point) -> RowVector3<f64> {
-    RowVector3::new(direction.x, direction.y, direction.y * arm.x - direction.x * arm.y)
+/// Lays down what is free. `start` is where the scanner is, in cells from the window's corner.
+fn free(fan: &Fan, rings: &Rings, start: Point, rows: usize, canvas: &mut Canvas) {
+    let mut outline = std::mem::take(&mut canvas.outline);
+    outline.begin(rows);
+    // An outline goes through the centres of cells.
+    let centre = start - Point::new(0.5, 0.5);
+    let eye = corner(&centre);
+    let at = |sheaf: &Sheaf, distance: f64| corner(&(centre + sheaf.direction * distance));
+    let mut before = fan.sheaves.last();
+    for (index, sheaf) in fan.sheaves.iter().enumerate() {
+        let end = at(sheaf, sheaf.free);
+        match before.filter(|_| sheaf.follows) {
+            None => outline.edge(eye, end),
+            Some(before) if sheaf.joins(before) => outline.edge(at(before, before.free), end),
+            // What lies between a near end and a far one was seen as far as the near one.
+            Some(before) if before.free < sheaf.free => {
+                let beside = at(sheaf, before.free);
+                outline.edge(at(before, before.free), beside);
+                outline.edge(beside, end);
+            }
+            Some(before) => {
+                let beside = at(before, sheaf.free);
+                outline.edge(at(before, before.free), beside);
+                outline.edge(beside, end);
+            }
+        }
+        let next = fan.sheaves.get(index + 1).or(fan.sheaves.first());
+        if !next.is_some_and(|next| next.follows) {
+            outline.edge(end, eye);
+            if !sheaf.follows {
+                // What has no neighbours frees the cells that it crosses.
+                walk(&start, &sheaf.direction, sheaf.free, |cell, from, to| {
+                    let grade = rings.of_beam(0.5 * (from + to));
+                    canvas.lay(cell.row, cell.column, cell.column + 1, grade);
+                });
+            }
+        }
+        before = Some(sheaf);
+    }
+    outline.rows(|row, from, to| rings.lay(&centre, row, from, to, canvas));
+    canvas.outline = outline;
+}
+
+/// Adds the bumps where beams ended: as many points a cell apart as fit in, each to the cell in which it
+/// lies.
+fn hit(fan: &Fan, rings: &Rings, start: Point, canvas: &mut Canvas) {
+    for sheaf in &fan.sheaves {
+        let bump = fan.bumps.bump(sheaf.sd);
+        let side = (bump.len() / 2) as f64;
+        if sheaf.z < side || sheaf.z + side > rings.far {
+            continue;
+        }
+        let weight = if sheaf.z > rings.heading_to { 0.5 } else { 1.0 } * f64::from(sheaf.count);
+        let weight = fixed(weight);
+        let [mut x, mut y] = corner(&(start + sheaf.end - sheaf.direction * side));
+        let [step_x, step_y] = corner(&sheaf.direction);
+        for value in bump {
+            let value = whole(weight * i64::from(*value));
+            canvas.add(whole(x), whole(y), value.min(i32::from(i16::MAX)) as i16);
+            x += step_x;
+            y += step_y;
+        }
+    }
+}
+
+/// Variance of the scanner's place along a direction: the robot's position projected, and its heading
+/// by the lever of the scanner's place on it, `arm`, in the level frame.
+fn variance_along(direction: &Point, arm: &Point, covariance: &Matrix3<f64>) -> f64 {
+    let (x, y) = (direction.x, direction.y);
+    // d(place along the direction) / d heading.
+    let lever = y * arm.x - x * arm.y;
+    let c = |row, column| covariance[(row, column)];
+    x * x * c(0, 0)
+        + y * y * c(1, 1)
+        + lever * lever * c(2, 2)
+        + 2.0 * (x * y * c(0, 1) + lever * (x * c(0, 2) + y * c(1, 2)))
 }
 
 #[cfg(test)]
@@ -131,7 +236,7 @@ mod tests {
         let profile = preset("sick-lms").and_then(|s| s.scanner).unwrap();
         scanner_evidence(
             scan,
-            &vec![true; scan.ranges.len()],
+            |_| true,
             &profile,
             &UncertainPose { pose, covariance: Covariance::from_variances(sd.map(|s| s * s)) },
             0.05,
@@ -244,7 +349,7 @@ mod tests {
         let pose = UncertainPose { pose: Pose::identity(), covariance: Covariance::zero() };
         let patch = scanner_evidence(
             &scan(vec![3.0, 50.0], 0.0),
-            &[false, false],
+            |_| false,
             &profile,
             &pose,
             0.05,

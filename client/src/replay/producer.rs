@@ -10,7 +10,7 @@ use uuid::Uuid;
 
 use super::{AHEAD_MAX, CHUNK, ReplayError, ReplayProgress, TICK, worker};
 use crate::log::Log;
-use crate::robot::{Passed, Surveyor};
+use crate::robot::{Passed, SonarVerdicts, Surveyor};
 use crate::sync::{Outbox, OutboxConfig, OutboxContents, Pushed};
 
 /// What became of the readings.
@@ -26,6 +26,8 @@ pub(super) struct Surveyed {
     pub(super) waited: u64,
     /// Readings that gave none, by reason.
     pub(super) passed: BTreeMap<Passed, u64>,
+    /// What was thought of the sonar readings of this run's contributions.
+    pub(super) sonar: SonarVerdicts,
 }
 
 impl Surveyed {
@@ -147,7 +149,9 @@ impl Producer {
                 if outbox.acknowledgement(frame, id).is_some() {
                     surveyed.known += 1;
                 } else {
-                    made.push(surveyor.observe(reading, pose).to_wire(frame));
+                    let look = surveyor.observe(reading, pose);
+                    surveyed.sonar.add(&look.sonar);
+                    made.push(look.to_wire(frame));
                 }
             }
             for pushed in outbox.push_many(&made)? {

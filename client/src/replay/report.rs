@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::ReplayOptions;
 use super::producer::{Surveyed, in_words};
 use crate::log::Summary;
+use crate::robot::SonarVerdicts;
 use crate::sync::{UploadEnd, UploadSummary};
 
 /// The outcome of a replay.
@@ -45,6 +46,8 @@ pub struct Report {
     pub waiting: u64,
     /// Readings that gave none, by reason.
     pub passed: BTreeMap<String, u64>,
+    /// What was thought of the sonar readings of contributions made in this run, rule by rule.
+    pub sonar: SonarVerdicts,
     /// Highest revision in a receipt of this run.
     pub revision: Option<i64>,
     /// Bytes of request bodies sent, packed, repeated ones included.
@@ -93,6 +96,7 @@ impl Report {
                 .iter()
                 .map(|(passed, count)| (in_words(*passed).to_owned(), *count))
                 .collect(),
+            sonar: surveyed.sonar,
             revision: progress.revision,
             bytes_up: progress.traffic.bytes_up,
             bytes_down: progress.traffic.bytes_down,

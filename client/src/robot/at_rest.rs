@@ -5,13 +5,14 @@
 //! scans of a stop become one, whose ranges are means of what agrees beam by beam: median and median
 //! absolute deviation throw out what passed by, and single readings that went wrong.
 //!
-//! Rings of sonars are left as they are: what makes them err does not change from one to the next.
+//! Rounds of a ring of sonars are one look too, but not a better one: what makes a sonar err does not change
+//! from one to the next. What does change is another sonar's pulse, and it is told by that.
 
 use mapfold_map::geometry::Pose;
 
 use crate::log::{Observation, Reading};
-use crate::sensor::Scan;
 use crate::sensor::robust::{SD_PER_MEDIAN_DEVIATION, middle};
+use crate::sensor::{Ring, Scan, Sonar};
 
 /// When a robot stands, and which readings of a stop agree.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,6 +27,8 @@ pub struct AtRestConfig {
     pub scans_min: usize,
     /// A longer stop is several looks.
     pub scans_max: usize,
+    /// Echoes of one sonar that differ by more than this are not of one thing, metres.
+    pub echoes_apart: f64,
     /// Readings that are off the median by more than this many deviations, by the median of these,
     /// are left out.
     pub deviations_max: f64,
@@ -43,15 +46,29 @@ impl AtRestConfig {
         pause_max: 2.0,
         scans_min: 3,
         scans_max: 64,
+        echoes_apart: 0.3,
         deviations_max: 3.5,
         deviation_min: 0.005,
         deviation_max: 0.1,
     };
 }
 
-/// Makes one scan of all that were taken in each stop; other readings stay. Readings are numbered
-/// anew.
+/// Makes one scan of all that were taken in each stop, and one ring of all rounds of sonars; other
+/// readings stay. Readings are numbered anew.
 pub fn settle(readings: Vec<Reading>, config: &AtRestConfig) -> Vec<Reading> {
+    let is_scan = |reading: &Reading| matches!(reading.observation, Observation::Scan(_));
+    let (scans, rings) = readings.into_iter().partition(is_scan);
+    let mut settled = settle_alike(scans, config);
+    settled.append(&mut settle_alike(rings, config));
+    settled.sort_by_key(|reading| reading.index);
+    for (index, reading) in (0..).zip(&mut settled) {
+        reading.index = index;
+    }
+    settled
+}
+
+/// The same for readings of one kind.
+fn settle_alike(readings: Vec<Reading>, config: &AtRestConfig) -> Vec<Reading> {
     let mut settled: Vec<Reading> = Vec::with_capacity(readings.len());
     let mut stop: Vec<Reading> = Vec::new();
     for reading in readings {
@@ -60,22 +77,13 @@ pub fn settle(readings: Vec<Reading>, config: &AtRestConfig) -> Vec<Reading> {
         }) {
             end(&mut stop, &mut settled, config);
         }
-        match reading.observation {
-            Observation::Scan(_) => stop.push(reading),
-            Observation::Ring(_) => settled.push(reading),
-        }
+        stop.push(reading);
     }
     end(&mut stop, &mut settled, config);
-    // Rings of a stop were laid down before its scans.
-    settled.sort_by_key(|reading| reading.index);
-    for (index, reading) in (0..).zip(&mut settled) {
-        reading.index = index;
-    }
     settled
 }
 
-/// Whether `next` may belong to the stop between `first` and `last`. A ring in between does not end
-/// a stop while the robot stands.
+/// Whether `next` may belong to the stop between `first` and `last`.
 fn stands(first: &Reading, last: &Reading, next: &Reading, config: &AtRestConfig) -> bool {
     fn near<A: Copy, B: Copy>(a: &Pose<A, B>, b: &Pose<A, B>, config: &AtRestConfig) -> bool {
         let moved = a.inverse().compose(b);
@@ -92,7 +100,13 @@ fn stands(first: &Reading, last: &Reading, next: &Reading, config: &AtRestConfig
                 && a.range_max.to_bits() == b.range_max.to_bits()
                 && a.robot_from_sensor == b.robot_from_sensor
         }
-        _ => true,
+        (Observation::Ring(a), Observation::Ring(b)) => {
+            let mounts = a.sonars.iter().zip(&b.sonars);
+            a.cone.to_bits() == b.cone.to_bits()
+                && a.sonars.len() == b.sonars.len()
+                && mounts.into_iter().all(|(a, b)| a.robot_from_sensor == b.robot_from_sensor)
+        }
+        _ => false,
     };
     let waited = next.time_s - last.time_s;
     alike
@@ -102,23 +116,48 @@ fn stands(first: &Reading, last: &Reading, next: &Reading, config: &AtRestConfig
         && by_wheels.unwrap_or(true)
 }
 
-/// Lays the scans of a stop down, as one if they are enough.
+/// Lays the readings of a stop down, as one if they are enough.
 fn end(stop: &mut Vec<Reading>, settled: &mut Vec<Reading>, config: &AtRestConfig) {
-    let scans: Vec<&Scan> = stop
-        .iter()
-        .filter_map(|reading| match &reading.observation {
-            Observation::Scan(scan) => Some(scan),
-            Observation::Ring(_) => None,
-        })
-        .collect();
-    match mean(&scans, config) {
-        Some(scan) => settled.extend(
-            stop.drain(..)
-                .next_back()
-                .map(|last| Reading { observation: Observation::Scan(scan), ..last }),
-        ),
+    let (mut scans, mut rings) = (Vec::new(), Vec::new());
+    for reading in &*stop {
+        match &reading.observation {
+            Observation::Scan(scan) => scans.push(scan),
+            Observation::Ring(ring) => rings.push(ring),
+        }
+    }
+    let scan = mean(&scans, config).map(Observation::Scan);
+    match scan.or_else(|| steady(&rings, config).map(Observation::Ring)) {
+        Some(observation) => {
+            settled.extend(stop.drain(..).next_back().map(|last| Reading { observation, ..last }));
+        }
         None => settled.append(stop),
     }
+}
+
+/// The ring that the rounds of one stop come to, sonar by sonar; `None` of fewer than two. A sonar is
+/// steady if more than half of its echoes are within [`AtRestConfig::echoes_apart`] of each other, or
+/// if it mostly heard nothing.
+pub fn steady(rounds: &[&Ring], config: &AtRestConfig) -> Option<Ring> {
+    let first = rounds.first().filter(|_| rounds.len() > 1)?;
+    let mut echoes: Vec<f64> = Vec::with_capacity(rounds.len());
+    let sonars = first.sonars.iter().enumerate().map(|(index, sonar)| {
+        echoes.clear();
+        echoes.extend(rounds.iter().filter_map(|ring| ring.sonars.get(index)?.range));
+        if 2 * echoes.len() < rounds.len() {
+            return Sonar { range: None, ..*sonar };
+        }
+        echoes.sort_unstable_by(f64::total_cmp);
+        let alike = (0..echoes.len()).map(|from| {
+            let near = |echo: &&f64| **echo - echoes[from] <= config.echoes_apart;
+            &echoes[from..from + echoes[from..].iter().take_while(near).count()]
+        });
+        let most = alike.max_by_key(|alike| alike.len()).unwrap_or_default();
+        // Whatever the others are, before the nearest of all nothing was heard.
+        let is_steady = 2 * most.len() > echoes.len();
+        let range = if is_steady { most.get(most.len() / 2) } else { echoes.first() };
+        Sonar { range: range.copied(), is_steady, ..*sonar }
+    });
+    Some(Ring { cone: first.cone, sonars: sonars.collect() })
 }
 
 /// The scan that scans of one stop come to, beam by beam; `None` if they are too few. A beam has a
@@ -251,6 +290,35 @@ mod tests {
         assert_eq!(
             kinds(settle(vec![scan(0), ring(1), scan(2), scan(3), ring(4)], &CONFIG)),
             "oso"
+        );
+    }
+
+    #[test]
+    fn echoes_that_change_while_the_robot_stands_are_not_steady() {
+        let ring = |ranges: [Option<f64>; 3]| Ring {
+            cone: 0.4,
+            sonars: ranges
+                .map(|range| Sonar { robot_from_sensor: Pose::identity(), range, is_steady: true })
+                .to_vec(),
+        };
+        let of = |rounds: &[[Option<f64>; 3]]| {
+            let rings: Vec<Ring> = rounds.iter().map(|ranges| ring(*ranges)).collect();
+            let settled = steady(&rings.iter().collect::<Vec<_>>(), &CONFIG)?;
+            Some(settled.sonars.iter().map(|s| (s.range, s.is_steady)).collect::<Vec<_>>())
+        };
+        assert_eq!(of(&[[None; 3]]), None, "a single round");
+        assert_eq!(
+            of(&[[Some(2.0), Some(2.0), None], [Some(2.1), Some(2.4), Some(1.0)]]),
+            Some(vec![(Some(2.1), true), (Some(2.0), false), (Some(1.0), true)]),
+        );
+        assert_eq!(
+            of(&[
+                [Some(2.0), Some(2.0), None],
+                [Some(2.1), Some(1.0), None],
+                [Some(0.7), Some(3.0), Some(1.0)]
+            ]),
+            Some(vec![(Some(2.1), true), (Some(1.0), false), (None, true)]),
+            "two of three agree, none do, most heard nothing"
         );
     }
 

@@ -7,7 +7,7 @@ use uuid::Uuid;
 
 use super::{Scanner, Surveyor};
 use crate::emulation::{self, Chance};
-use crate::evidence::{scanner_evidence, sonar_evidence};
+use crate::evidence::{KnownWalls, SonarVerdicts, scanner_evidence, sonar_evidence};
 use crate::log::{Observation, Reading};
 use crate::perception::BeamState;
 use crate::sensor::{MountedAt, Ring, Scan};
@@ -19,6 +19,8 @@ pub struct Look {
     pub contribution: Contribution,
     /// Whether its readings were derived from those of another sensor.
     pub emulated: bool,
+    /// What was thought of its sonar readings.
+    pub sonar: SonarVerdicts,
 }
 
 impl Look {
@@ -29,18 +31,26 @@ impl Look {
 }
 
 /// Fills in what the reading shows.
-pub(super) fn fill(surveyor: &mut Surveyor, reading: &Reading, look: &mut Contribution) {
+pub(super) fn fill(
+    surveyor: &mut Surveyor,
+    reading: &Reading,
+    walls: Option<&dyn KnownWalls>,
+    look: &mut Contribution,
+) -> SonarVerdicts {
     match (&reading.observation, surveyor.emulation) {
-        (Observation::Ring(ring), _) => hear(surveyor, ring, look),
-        (Observation::Scan(scan), None) => see(surveyor, scan, look),
+        (Observation::Ring(ring), _) => hear(surveyor, ring, walls, look),
+        (Observation::Scan(scan), None) => {
+            see(surveyor, scan, look);
+            SonarVerdicts::default()
+        }
         (Observation::Scan(scan), Some(config)) => {
-            let Some(profile) = &surveyor.sonar else { return };
+            let Some(profile) = &surveyor.sonar else { return SonarVerdicts::default() };
             // The id's own chance: the same reading is always heard the same.
             let mut seed = [0; 8];
             seed.copy_from_slice(&look.id.0[8..]);
             let mut chance = Chance::new(u64::from_be_bytes(seed));
             let ring = emulation::emulate(scan, profile, &config, &mut chance);
-            hear(surveyor, &ring, look);
+            hear(surveyor, &ring, walls, look)
         }
     }
 }
@@ -55,10 +65,10 @@ fn see(surveyor: &mut Surveyor, scan: &Scan, look: &mut Contribution) {
     look.segments.clone_from(&features.segments);
     look.clusters.clone_from(&features.clusters);
     let (scan, states) = (extractor.corrected_scan().unwrap_or(scan), extractor.states());
-    let usable: Vec<bool> = states.iter().map(|s| *s == BeamState::Hit).collect();
+    let usable = |beam: usize| states.get(beam).is_some_and(|state| *state == BeamState::Hit);
     let patch = scanner_evidence(
         scan,
-        &usable,
+        usable,
         profile,
         &look.level_from_robot,
         surveyor.config.resolution,
@@ -77,15 +87,22 @@ fn mounted(scan: &Scan, mount: &MountedAt) -> Option<Scan> {
 }
 
 /// Evidence of a ring.
-fn hear(surveyor: &mut Surveyor, ring: &Ring, look: &mut Contribution) {
-    let Some(profile) = &surveyor.sonar else { return };
-    let patch = sonar_evidence(
+fn hear(
+    surveyor: &mut Surveyor,
+    ring: &Ring,
+    walls: Option<&dyn KnownWalls>,
+    look: &mut Contribution,
+) -> SonarVerdicts {
+    let Some(profile) = &surveyor.sonar else { return SonarVerdicts::default() };
+    let (patch, verdicts) = sonar_evidence(
         ring,
         profile,
         &look.level_from_robot,
+        walls,
         surveyor.config.resolution,
         &surveyor.sonar_evidence,
         &mut surveyor.canvas,
     );
     look.evidence.extend((!patch.tiles.is_empty()).then_some(patch));
+    verdicts
 }

@@ -76,6 +76,9 @@ pub struct Sonar {
     pub robot_from_sensor: Pose<Robot, Sensor>,
     /// Distance of the first echo, metres; `None` without echo.
     pub range: Option<f64>,
+    /// Whether it heard the same in the rounds of a stop, if there were several; else the range is
+    /// that of the nearest echo.
+    pub is_steady: bool,
 }
 
 /// What all sonars of a robot heard at about the same time.

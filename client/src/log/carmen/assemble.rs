@@ -135,6 +135,7 @@ impl State {
                     .map(|(range, mount)| Sonar {
                         robot_from_sensor: pose(mount),
                         range: (range.is_finite() && range > 0.0).then_some(range),
+                        is_steady: true,
                     })
                     .collect();
                 self.push(Reading {
