@@ -43,6 +43,7 @@ pub mod meter;
 pub mod plane;
 pub mod programs;
 pub mod range;
+pub mod raster;
 pub mod report;
 pub mod robot;
 pub mod server;

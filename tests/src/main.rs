@@ -6,7 +6,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use mapfold_tests::{
-    change, evaluation, extraction, figure, growth, honesty, range, serving, speed, structures,
+    change, evaluation, extraction, figure, growth, honesty, range, raster, serving, speed,
+    structures,
 };
 
 /// Measures Mapfold and rewrites the tables of a report between their markers.
@@ -86,6 +87,15 @@ enum Command {
         #[arg(long, value_name = "DIR")]
         data: Option<PathBuf>,
     },
+    /// Makes grids of simulated and recorded sonars and scanners, and holds them against what is there
+    Raster {
+        /// The page with the markers `sonar-grid`, `rules`, `scanner-grid`, `layers` and `recorded`
+        #[arg(long, value_name = "FILE")]
+        report: PathBuf,
+        /// The SVG of a real corridor to write
+        #[arg(long, value_name = "FILE")]
+        picture: PathBuf,
+    },
     /// Gathers the figures that Criterion has left in the target folder
     Benches {
         /// The page with the markers `benches`
@@ -111,6 +121,7 @@ async fn main() -> ExitCode {
         Command::Serving { report } => serving::tables(&report).await,
         Command::Structures { report } => structures::table(&report),
         Command::Figure { out } => figure::write(&out).await.map(|()| Vec::new()),
+        Command::Raster { report, picture } => raster::raster(&report, &picture),
         Command::Benches { report, criterion } => speed::benches(&report, &criterion),
     };
     match done {

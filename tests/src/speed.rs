@@ -40,7 +40,36 @@ pub fn benches(page: &Path, criterion: &Path) -> Result<Vec<String>, Error> {
     rows.sort();
     let header = ["benchmark", "mean", "95 % from", "to"];
     report::rewrite(page, "benches", &report::table(&header, &rows))?;
-    beside_the_bare_loop(page, criterion)
+    let mut faults = beside_the_bare_loop(page, criterion)?;
+    faults.extend(beside_rays(page, criterion)?);
+    Ok(faults)
+}
+
+/// Rewrites the table `insertion`: how many times as fast as the bare ray loop scans enter cells, and what
+/// adding tiles comes to beside plain addition.
+fn beside_rays(page: &Path, criterion: &Path) -> Result<Vec<String>, Error> {
+    let median = |group: &str, name: &str| {
+        Ok::<_, Error>(latest(&criterion.join(group).join(name))?.map(|e| e.median.point_estimate))
+    };
+    let mut rows = Vec::new();
+    let mut faults = Vec::new();
+    let mut compare = |what: String, limit: Option<f64>, own: Option<f64>| match (limit, own) {
+        (Some(limit), Some(own)) => {
+            rows.push(vec![what, time(limit), time(own), format!("{:.2}", limit / own)]);
+        }
+        _ => faults.push(format!("no figures of {what}")),
+    };
+    for beams in ["361", "682", "1081"] {
+        let of = |name: &str| median("insertion", &format!("{name}/{beams}"));
+        compare(format!("a scan of {beams} beams, bare rays"), of("bare rays")?, of("Mapfold")?);
+    }
+    let of = |name: &str| median("tiles", name);
+    compare("adding a tile, saturating".to_owned(), of("saturating addition")?, of("a tile")?);
+    compare("adding a tile, plain".to_owned(), of("plain addition")?, of("a tile")?);
+    compare("adding a full patch, plain".to_owned(), of("plain addition")?, of("a patch")?);
+    let header = ["what, beside what", "that", "Mapfold", "times as fast"];
+    report::rewrite(page, "insertion", &report::table(&header, &rows))?;
+    Ok(faults)
 }
 
 /// Rewrites the table `ratios`: what extraction costs in times of the bare loop.
@@ -130,9 +159,14 @@ mod tests {
             write(&format!("lines/bare loop/{beams}"), "10000.0");
             write(&format!("lines/Mapfold/{beams}"), "19000.0");
             write(&format!("lines/Mapfold with a table/{beams}"), "25000.0");
+            write(&format!("insertion/bare rays/{beams}"), "30000.0");
+            write(&format!("insertion/Mapfold/{beams}"), "20000.0");
+        }
+        for name in ["saturating addition", "plain addition", "a tile", "a patch"] {
+            write(&format!("tiles/{name}"), "400.0");
         }
         let page = folder.path().join("page.md");
-        let markers = ["benches", "ratios"]
+        let markers = ["benches", "ratios", "insertion"]
             .map(|name| format!("<!-- begin: {name} -->\n<!-- end: {name} -->\n"));
         std::fs::write(&page, markers.concat()).expect("a page");
         assert!(benches(&page, &criterion).expect("a table").is_empty());
@@ -140,6 +174,8 @@ mod tests {
         assert!(text.contains("| fold/one look | 2.000 s | 1.500 µs | 2.500 ms |"), "{text}");
         let ratios = "| 361 | 10.000 µs | 19.000 µs | 25.000 µs | 1.90 | 2.50 |";
         assert!(text.contains(ratios), "{text}");
+        let insertion = "| a scan of 682 beams, bare rays | 30.000 µs | 20.000 µs | 1.50 |";
+        assert!(text.contains(insertion), "{text}");
         assert_eq!(benches(&page, &folder.path().join("nothing")).expect("an answer").len(), 1);
     }
 }
