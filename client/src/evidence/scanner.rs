@@ -150,16 +150,19 @@ fn free(fan: &Fan, rings: &Rings, start: Point, rows: usize, canvas: &mut Canvas
         match before.filter(|_| sheaf.follows) {
             None => outline.edge(eye, end),
             Some(before) if sheaf.joins(before) => outline.edge(at(before, before.free), end),
-            // What lies between a near end and a far one was seen as far as the near one.
+            // What lies between a near end and a far one was seen as far as the near one; the far one's
+            // beam went on by itself.
             Some(before) if before.free < sheaf.free => {
                 let beside = at(sheaf, before.free);
                 outline.edge(at(before, before.free), beside);
                 outline.edge(beside, end);
+                cross(sheaf, before.free, &start, rings, canvas);
             }
             Some(before) => {
                 let beside = at(before, sheaf.free);
                 outline.edge(at(before, before.free), beside);
                 outline.edge(beside, end);
+                cross(before, sheaf.free, &start, rings, canvas);
             }
         }
         let next = fan.sheaves.get(index + 1).or(fan.sheaves.first());
@@ -167,16 +170,22 @@ fn free(fan: &Fan, rings: &Rings, start: Point, rows: usize, canvas: &mut Canvas
             outline.edge(end, eye);
             if !sheaf.follows {
                 // What has no neighbours frees the cells that it crosses.
-                walk(&start, &sheaf.direction, sheaf.free, |cell, from, to| {
-                    let grade = rings.of_beam(0.5 * (from + to));
-                    canvas.lay(cell.row, cell.column, cell.column + 1, grade);
-                });
+                cross(sheaf, 0.0, &start, rings, canvas);
             }
         }
         before = Some(sheaf);
     }
     outline.rows(|row, from, to| rings.lay(&centre, row, from, to, canvas));
     canvas.outline = outline;
+}
+
+/// Frees the cells that a beam crosses by itself, from a distance on.
+fn cross(sheaf: &Sheaf, from: f64, start: &Point, rings: &Rings, canvas: &mut Canvas) {
+    let direction = &sheaf.direction;
+    walk(&(start + direction * from), direction, sheaf.free - from, |cell, entered, left| {
+        let grade = rings.of_beam(from + 0.5 * (entered + left));
+        canvas.lay(cell.row, cell.column, cell.column + 1, grade);
+    });
 }
 
 /// Adds the bumps where beams ended: as many points a cell apart as fit in, each to the cell in which it
