@@ -1,6 +1,7 @@
 //! Occupancy evidence: integer log-odds that add up in any order and can be taken out exactly.
 
 mod blocks;
+mod crossed;
 mod evidence;
 mod log_odds;
 mod slices;
@@ -8,6 +9,7 @@ mod tile;
 mod together;
 
 pub(crate) use blocks::{Blocks, Touched};
+pub(crate) use crossed::crossed;
 pub use evidence::{EvidencePatch, EvidenceRun, RunError, TilePatch};
 pub use log_odds::LogOdds;
 pub(crate) use slices::Stack;

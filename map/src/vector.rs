@@ -7,6 +7,7 @@
 //! ([`Segment`]) -> oriented (`piece`), joined where ends meet
 //! (`joint`, `gap`, `chains`) and cut to valid outlines (`outline`, `crossing`): [`Chain`]. Clusters go
 //! the same way as segments, shorter (`things`), and end where a wall explains them (`explained`).
+//! What walls explain of the grid is told from what is published (`confirmed`).
 //!
 //! What depends on what is found in a few places of memory, however large the level is: by numbered
 //! places (`slots`), by squares of the level (`squares`, `ends`), by blocks of cells (`by_block`).
@@ -17,6 +18,7 @@ mod chain;
 mod chains;
 mod cluster;
 mod config;
+mod confirmed;
 mod crossing;
 mod ends;
 mod explained;
@@ -41,6 +43,7 @@ pub use chain::{Chain, ChainId, ChainKind, Vertex};
 pub(crate) use chains::Chains;
 pub use cluster::{Cluster, ObservedCluster};
 pub use config::VectorConfig;
+pub use confirmed::{ConfirmedConfig, confirmed};
 pub(crate) use seen_through::Evidence;
 pub use segment::{EndKind, Facing, ObservedEnd, ObservedSegment, Segment, SolidInterval};
 pub(crate) use things::Things;

@@ -20,6 +20,7 @@ pub(crate) mod rows;
 mod since;
 mod snapshot;
 mod trial;
+mod walls;
 mod write_behind;
 
 use std::sync::Arc;

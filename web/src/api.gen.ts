@@ -270,7 +270,8 @@ export interface paths {
         /**
          * One tile's evidence: 64 x 64 cells, row by row from below, each a little-endian `i32` of
          *     log-odds in 0.01 nat, not clamped. A tile without evidence is not found. Layers together are their
-         *     sum, but that sonar counts three tenths of itself in cells of which scanners say anything.
+         *     sum, but that sonar counts three tenths of itself in cells of which scanners say anything, and that
+         *     cells that a confirmed wall passes through read no less than it says (2 nat).
          */
         get: operations["read_raster_tile"];
         put?: never;
@@ -1193,6 +1194,8 @@ export interface components {
             removed: components["schemas"]["TileAddress"][];
             /** @description Tiles of which the prior says nothing any more. */
             removed_prior?: components["schemas"]["TilePlace"][];
+            /** @description Tiles of which confirmed walls say nothing any more. */
+            removed_walls?: components["schemas"]["TilePlace"][];
             /**
              * Format: double
              * @description Edge of a cell.
@@ -1210,6 +1213,8 @@ export interface components {
             since: number;
             /** @description New or changed tiles. */
             tiles: components["schemas"]["TileAddress"][];
+            /** @description New or changed tiles of what confirmed walls say of the cells that they pass through. */
+            walls?: components["schemas"]["TilePlace"][];
         };
         /** @description The contribution is on disk. The same id gets the same receipt, however often it is sent. */
         Receipt: {
@@ -2238,8 +2243,8 @@ export interface operations {
                 mode?: "trinary" | "scale" | "raw";
                 /** @description `nav2`: `pgm` or `png`; `png` for mode scale and `pgm` for the others if absent. */
                 image?: "pgm" | "png";
-                /** @description `nav2`: `all` (together, the default), `scanner`, `sonar` or `prior`. */
-                layer?: "all" | "scanner" | "sonar" | "prior";
+                /** @description `nav2`: `all` (together, the default), `scanner`, `sonar`, `prior` or `walls`. */
+                layer?: "all" | "scanner" | "sonar" | "prior" | "walls";
                 /** @description `nav2`: only the cells that touch this rectangle, `min_x,min_y,max_x,max_y` in metres. */
                 bbox?: string;
             };
@@ -2572,8 +2577,8 @@ export interface operations {
             query: {
                 /** @description Places of tiles as `x,y,x,y,...`, at most 256. */
                 tiles: string;
-                /** @description `scanner`, `sonar`, `prior`, or `all`, these together; without the prior if absent. */
-                layer?: "all" | "scanner" | "sonar" | "prior";
+                /** @description `scanner`, `sonar`, `prior`, `walls`, or `all`, these together; without prior and walls if absent. */
+                layer?: "all" | "scanner" | "sonar" | "prior" | "walls";
             };
             header?: never;
             path: {
@@ -2614,10 +2619,10 @@ export interface operations {
     read_raster_tile: {
         parameters: {
             query?: {
-                /** @description The class of sensors; all together, without the prior, if neither this nor `layer` is there. */
+                /** @description The class of sensors; those of robots together, without prior and walls, if neither this nor `layer` is there. */
                 sensor?: "scanner" | "sonar";
-                /** @description Instead of `sensor`: `scanner`, `sonar`, `prior`, or `all`, these together. */
-                layer?: "all" | "scanner" | "sonar" | "prior";
+                /** @description Instead of `sensor`: `scanner`, `sonar`, `prior`, `walls`, or `all`, these together. */
+                layer?: "all" | "scanner" | "sonar" | "prior" | "walls";
             };
             header?: never;
             path: {
@@ -2875,8 +2880,8 @@ export interface operations {
     read_picture: {
         parameters: {
             query?: {
-                /** @description `all` (together, the default), `scanner`, `sonar` or `prior`. */
-                layer?: "all" | "scanner" | "sonar" | "prior";
+                /** @description `all` (together, the default), `scanner`, `sonar`, `prior` or `walls`. */
+                layer?: "all" | "scanner" | "sonar" | "prior" | "walls";
             };
             header?: never;
             path: {

@@ -69,8 +69,8 @@ export function withVector(content: Content, patch: VectorPatch): Content {
 export function withRaster(content: Content, changes: RasterChanges): Content {
   const whole = changes.since === 0;
   if (!whole && changes.since !== content.rasterRevision) return content;
-  const gone = [...changes.removed, ...ofPrior(changes.removed_prior)];
-  const there = [...changes.tiles, ...ofPrior(changes.prior)];
+  const gone = [...changes.removed, ...at("prior", changes.removed_prior), ...at("walls", changes.removed_walls)];
+  const there = [...changes.tiles, ...at("prior", changes.prior), ...at("walls", changes.walls)];
   if (!whole && there.length === 0 && gone.length === 0) {
     return { ...content, rasterRevision: changes.revision };
   }
@@ -95,14 +95,16 @@ export function withRaster(content: Content, changes: RasterChanges): Content {
   };
 }
 
-function ofPrior(places: readonly TilePlace[] | undefined): LayerTile[] {
-  return (places ?? []).map(({ x, y }) => ({ sensor: "prior", x, y }));
+function at(sensor: "prior" | "walls", places: readonly TilePlace[] | undefined): LayerTile[] {
+  return (places ?? []).map(({ x, y }) => ({ sensor, x, y }));
 }
 
-/** Tiles that hold evidence; the prior is none. */
+/** Tiles that hold evidence of robots; prior and walls are none. */
 export function tileCount(content: Content): number {
   let count = 0;
-  for (const { present, address } of content.tiles.values()) if (present && address.sensor !== "prior") count++;
+  for (const { present, address } of content.tiles.values()) {
+    if (present && address.sensor !== "prior" && address.sensor !== "walls") count++;
+  }
   return count;
 }
 

@@ -18,11 +18,11 @@ export interface PictureAddress {
   col: number;
 }
 
-/** A layer of the raster: what sensors of one class saw, or the prior, which no robot saw. */
-export type LayerId = SensorClass | "prior";
+/** A layer of the raster: what sensors of one class saw, the prior, which no robot saw, or what confirmed walls say. */
+export type LayerId = SensorClass | "prior" | "walls";
 
-/** Which evidence a picture shows. */
-export type Evidence = "all" | LayerId;
+/** Which evidence a picture shows; walls by themselves are drawn as segments. */
+export type Evidence = "all" | Exclude<LayerId, "walls">;
 
 /** The choices of evidence, as permalinks and pictures name them. */
 export const EVIDENCE: readonly Evidence[] = ["all", "scanner", "sonar", "prior"];

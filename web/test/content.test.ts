@@ -1,4 +1,5 @@
 import { describe, expect, it } from "vitest";
+import { pictureMarks } from "../src/pyramid";
 import { boundsOf, NO_CONTENT, tileCount, withRaster, withVector } from "../src/content";
 import { chain, cluster, rasterChanges, segment, tile, vectorPatch } from "./samples";
 
@@ -92,6 +93,18 @@ describe("changes of tiles", () => {
     const gone = withRaster(known, rasterChanges(5, 6, { removed_prior: [{ x: 7, y: 7 }] }));
     expect(gone.tiles.get("prior/7/7")?.present).toBe(false);
     expect(gone.tiles.get("scanner/0/0")?.revision).toBe(4);
+  });
+
+  it("keep what walls say apart from evidence, so that its pictures change and its tiles do not count", () => {
+    const known = withRaster(first, rasterChanges(4, 5, { walls: [{ x: 0, y: 0 }] }));
+    expect(known.tiles.get("walls/0/0")).toEqual({ address: { sensor: "walls", x: 0, y: 0 }, revision: 5, present: true });
+    expect(tileCount(known)).toBe(tileCount(first));
+    const marks = pictureMarks(known.tiles.values(), { z: 6, evidence: "all", tileCells: 64 });
+    expect(marks.get("6/-1/0")?.revision).toBe(5);
+    const alone = pictureMarks(known.tiles.values(), { z: 6, evidence: "sonar", tileCells: 64 });
+    expect(alone.get("6/-1/0")?.revision).not.toBe(5);
+    const gone = withRaster(known, rasterChanges(5, 6, { removed_walls: [{ x: 0, y: 0 }] }));
+    expect(gone.tiles.get("walls/0/0")).toMatchObject({ revision: 6, present: false });
   });
 
   it("that start somewhere else are not applied", () => {

@@ -3,7 +3,8 @@
 //! Each layer is summed and kept by itself; only who reads several at once weighs them against each
 //! other. Sonar counts in full where no scanner has looked, and for little where one has: its cone
 //! is decimetres wide and mirrored by smooth walls, so that many of its looks would wash a wall away
-//! that one scanner saw (`docs/decisions/0019`).
+//! that one scanner saw (`docs/decisions/0019`). And where a confirmed wall is, a cell is no freer than
+//! the wall says (`docs/decisions/0022`).
 
 use std::ops::Range;
 
@@ -18,20 +19,24 @@ pub struct Said {
     pub scanner: LogOdds,
     /// What sonars saw.
     pub sonar: LogOdds,
+    /// What confirmed walls say, not less than 0.
+    pub walls: LogOdds,
 }
 
 /// What counts of sonar evidence in a cell of which scanners say anything: 3 tenths.
 const SONAR_BESIDE_SCANNER: [i64; 2] = [3, 10];
 
-/// What the layers come to in one cell: their sum, sonar weighed; `None` where none says anything.
-/// What is beyond the bounds of `i32` is at them.
+/// What the layers come to in one cell: their sum, sonar weighed, but where there is a wall not less
+/// than it says; `None` where none says anything. What is beyond the bounds of `i32` is at them.
 pub fn together(said: Said) -> Option<LogOdds> {
-    let [prior, scanner, sonar] = [said.prior, said.scanner, said.sonar].map(|said| said.0);
-    if (prior, scanner, sonar) == (0, 0, 0) {
+    let Said { prior, scanner, sonar, walls } = said;
+    let [prior, scanner, sonar, walls] = [prior, scanner, sonar, walls].map(|said| said.0);
+    if [prior, scanner, sonar, walls] == [0; 4] {
         return None;
     }
     let sonar = if scanner == 0 { i64::from(sonar) } else { weighed(sonar) };
     let sum = i64::from(prior) + i64::from(scanner) + sonar;
+    let sum = if walls == 0 { sum } else { sum.max(i64::from(walls)) };
     Some(LogOdds(sum.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32))
 }
 
@@ -51,6 +56,8 @@ pub struct Layered<'a> {
     pub scanner: Option<&'a Tile>,
     /// What sonars saw.
     pub sonar: Option<&'a Tile>,
+    /// What confirmed walls say.
+    pub walls: Option<&'a Tile>,
 }
 
 /// The cells of a layer that says nothing.
@@ -59,17 +66,19 @@ static NOTHING: [i32; TILE_CELLS] = [0; TILE_CELLS];
 impl<'a> Layered<'a> {
     /// Whether no layer holds anything there.
     pub fn is_empty(&self) -> bool {
-        self.prior.or(self.scanner).or(self.sonar).is_none()
+        self.prior.or(self.scanner).or(self.sonar).or(self.walls).is_none()
     }
 
     /// What the layers say of some cells, given by their offsets.
     pub fn said(&self, cells: Range<usize>) -> impl Iterator<Item = Said> + use<'a> {
         let of = |tile: Option<&'a Tile>| &tile.map_or(&NOTHING, Tile::cells)[cells.clone()];
-        let (prior, scanner, sonar) = (of(self.prior), of(self.scanner), of(self.sonar));
-        prior.iter().zip(scanner).zip(sonar).map(|((prior, scanner), sonar)| Said {
+        let robots = of(self.scanner).iter().zip(of(self.sonar));
+        let others = of(self.prior).iter().zip(of(self.walls));
+        robots.zip(others).map(|((scanner, sonar), (prior, walls))| Said {
             prior: LogOdds(*prior),
             scanner: LogOdds(*scanner),
             sonar: LogOdds(*sonar),
+            walls: LogOdds(*walls),
         })
     }
 
@@ -93,7 +102,8 @@ mod tests {
     use super::*;
 
     fn said(prior: i32, scanner: i32, sonar: i32) -> Said {
-        Said { prior: LogOdds(prior), scanner: LogOdds(scanner), sonar: LogOdds(sonar) }
+        let walls = LogOdds(0);
+        Said { prior: LogOdds(prior), scanner: LogOdds(scanner), sonar: LogOdds(sonar), walls }
     }
 
     fn read(prior: i32, scanner: i32, sonar: i32) -> i32 {
@@ -153,6 +163,19 @@ mod tests {
         }
 
         #[test]
+        fn where_a_wall_is_nothing_reads_freer_than_it_and_surer_cells_stay(
+            prior in any_value(),
+            scanner in any_value(),
+            sonar in any_value(),
+            walls in 1..600_i32,
+        ) {
+            let evidence = said(prior, scanner, sonar);
+            let without = together(evidence).unwrap_or_default().0;
+            let with = together(Said { walls: LogOdds(walls), ..evidence }).unwrap_or_default().0;
+            prop_assert_eq!(with, without.max(walls));
+        }
+
+        #[test]
         fn it_is_the_same_for_and_against(
             prior in -600..600_i32,
             scanner in -600..600_i32,
@@ -172,7 +195,8 @@ mod tests {
                 layers[2][at] = sonar;
             }
             let [prior, scanner, sonar] = layers.map(Tile::new);
-            let all = Layered { prior: Some(&prior), scanner: Some(&scanner), sonar: Some(&sonar) };
+            let robots = Layered { scanner: Some(&scanner), sonar: Some(&sonar), ..Layered::default() };
+            let all = Layered { prior: Some(&prior), ..robots };
             let tile = all.together().unwrap_or_default();
             for at in 0..TILE_CELLS {
                 let cell = [&prior, &scanner, &sonar].map(|tile| tile.cells()[at]);

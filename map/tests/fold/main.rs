@@ -3,6 +3,7 @@
 
 mod chains;
 mod clusters;
+mod confirmed;
 mod existence;
 mod honesty;
 mod raster;

@@ -70,6 +70,12 @@ pub struct RasterChanges {
     /// Tiles of which the prior says nothing any more.
     #[serde(default)]
     pub removed_prior: Vec<TilePlace>,
+    /// New or changed tiles of what confirmed walls say of the cells that they pass through.
+    #[serde(default)]
+    pub walls: Vec<TilePlace>,
+    /// Tiles of which confirmed walls say nothing any more.
+    #[serde(default)]
+    pub removed_walls: Vec<TilePlace>,
 }
 
 /// A tile's place in a level's grid.

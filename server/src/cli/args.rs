@@ -210,6 +210,8 @@ pub(super) enum LayerName {
     Sonar,
     /// What was imported
     Prior,
+    /// What confirmed walls say of the cells that they pass through
+    Walls,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]

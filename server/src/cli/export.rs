@@ -83,6 +83,7 @@ impl Nav2Options {
             LayerName::Scanner => Layer::Only(LayerId::Sensor(SensorClass::Scanner)),
             LayerName::Sonar => Layer::Only(LayerId::Sensor(SensorClass::Sonar)),
             LayerName::Prior => Layer::Only(LayerId::Prior),
+            LayerName::Walls => Layer::Only(LayerId::Walls),
         };
         Content { layer, bbox: self.bbox }
     }

@@ -12,12 +12,18 @@ pub enum LayerId {
     Sensor(SensorClass),
     /// What was known before any robot came.
     Prior,
+    /// What confirmed walls say of the cells that they pass through.
+    Walls,
 }
 
 impl LayerId {
     /// All layers, in their canonical order.
-    pub const ALL: [Self; 3] =
-        [Self::Sensor(SensorClass::Scanner), Self::Sensor(SensorClass::Sonar), Self::Prior];
+    pub const ALL: [Self; 4] = [
+        Self::Sensor(SensorClass::Scanner),
+        Self::Sensor(SensorClass::Sonar),
+        Self::Prior,
+        Self::Walls,
+    ];
 }
 
 /// Which evidence is asked for.
@@ -73,6 +79,7 @@ pub fn layered<'a>(tiles: impl IntoIterator<Item = (LayerId, &'a Tile)>) -> Laye
             LayerId::Sensor(SensorClass::Scanner) => &mut layered.scanner,
             LayerId::Sensor(SensorClass::Sonar) => &mut layered.sonar,
             LayerId::Prior => &mut layered.prior,
+            LayerId::Walls => &mut layered.walls,
         };
         *place = Some(tile);
     }
@@ -89,7 +96,7 @@ pub fn layered_at(
     layered(parts.into_iter().filter_map(tile))
 }
 
-/// What robots saw; a map knows of no prior.
+/// What robots saw; a map knows of no prior, and holds its walls as segments.
 impl Raster for LevelMap {
     fn between(&self, layer: LayerId, first: TileIndex, last: TileIndex) -> LayerTiles<'_> {
         let LayerId::Sensor(class) = layer else { return Box::new(std::iter::empty()) };

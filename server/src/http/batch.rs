@@ -30,7 +30,7 @@ pub(super) struct BatchQuery {
     #[serde(deserialize_with = "places")]
     #[param(value_type = String)]
     tiles: Vec<TileIndex>,
-    /// `scanner`, `sonar`, `prior`, or `all`, these together; without the prior if absent.
+    /// `scanner`, `sonar`, `prior`, `walls`, or `all`, these together; without prior and walls if absent.
     #[param(inline)]
     layer: Option<LayerName>,
 }

@@ -56,7 +56,7 @@ pub(super) struct ExportQuery {
     /// `nav2`: `pgm` or `png`; `png` for mode scale and `pgm` for the others if absent.
     #[param(inline)]
     image: Option<ImageName>,
-    /// `nav2`: `all` (together, the default), `scanner`, `sonar` or `prior`.
+    /// `nav2`: `all` (together, the default), `scanner`, `sonar`, `prior` or `walls`.
     #[param(inline)]
     layer: Option<LayerName>,
     /// `nav2`: only the cells that touch this rectangle, `min_x,min_y,max_x,max_y` in metres.

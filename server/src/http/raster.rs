@@ -49,17 +49,18 @@ pub(super) async fn changes(
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(super) struct TileQuery {
-    /// The class of sensors; all together, without the prior, if neither this nor `layer` is there.
+    /// The class of sensors; those of robots together, without prior and walls, if neither this nor `layer` is there.
     #[param(inline)]
     sensor: Option<SensorClass>,
-    /// Instead of `sensor`: `scanner`, `sonar`, `prior`, or `all`, these together.
+    /// Instead of `sensor`: `scanner`, `sonar`, `prior`, `walls`, or `all`, these together.
     #[param(inline)]
     layer: Option<LayerName>,
 }
 
 /// One tile's evidence: 64 x 64 cells, row by row from below, each a little-endian `i32` of
 /// log-odds in 0.01 nat, not clamped. A tile without evidence is not found. Layers together are their
-/// sum, but that sonar counts three tenths of itself in cells of which scanners say anything.
+/// sum, but that sonar counts three tenths of itself in cells of which scanners say anything, and that
+/// cells that a confirmed wall passes through read no less than it says (2 nat).
 #[utoipa::path(
     get, path = route::RASTER_TILE, operation_id = "read_raster_tile", tag = "map",
     params(
@@ -101,6 +102,6 @@ pub(super) async fn tile(
 pub(super) fn parts(layer: Option<LayerName>) -> Vec<LayerId> {
     match layer {
         Some(layer) => Layer::from(layer).parts().collect(),
-        None => Layer::All.parts().filter(|part| *part != LayerId::Prior).collect(),
+        None => Layer::All.parts().filter(|part| matches!(part, LayerId::Sensor(_))).collect(),
     }
 }

@@ -20,8 +20,14 @@ const PNG: &str = "image/png";
 
 impl Raster for Snapshot {
     fn between(&self, layer: LayerId, first: TileIndex, last: TileIndex) -> LayerTiles<'_> {
-        let LayerId::Sensor(class) = layer else {
-            return Box::new(self.prior_between(first, last).map(|(at, tile)| (*at, tile)));
+        let class = match layer {
+            LayerId::Sensor(class) => class,
+            LayerId::Prior => {
+                return Box::new(self.prior_between(first, last).map(|(at, tile)| (*at, tile)));
+            }
+            LayerId::Walls => {
+                return Box::new(self.walls_between(first, last).map(|(at, tile)| (*at, tile)));
+            }
         };
         let key = |tile| TileKey { class, tile };
         Box::new(self.tiles_between(key(first), key(last)).map(|(key, tile)| (key.tile, tile)))
@@ -36,7 +42,9 @@ impl Dated for Snapshot {
     fn changed_after(&self, since: i64) -> Box<dyn Iterator<Item = (LayerId, TileIndex)> + '_> {
         let seen = self.tiles_changed_after(since);
         let seen = seen.map(|key| (LayerId::Sensor(key.class), key.tile));
-        Box::new(seen.chain(self.prior_changed_after(since).map(|at| (LayerId::Prior, at))))
+        let prior = self.prior_changed_after(since).map(|at| (LayerId::Prior, at));
+        let walls = self.walls_changed_after(since).map(|at| (LayerId::Walls, at));
+        Box::new(seen.chain(prior).chain(walls))
     }
 }
 
@@ -53,6 +61,8 @@ pub(super) enum LayerName {
     Sonar,
     /// What was imported, alone.
     Prior,
+    /// What confirmed walls say of the cells that they pass through, alone.
+    Walls,
 }
 
 /// Which evidence a picture shows.
@@ -60,7 +70,7 @@ pub(super) enum LayerName {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(super) struct PictureQuery {
-    /// `all` (together, the default), `scanner`, `sonar` or `prior`.
+    /// `all` (together, the default), `scanner`, `sonar`, `prior` or `walls`.
     #[serde(default)]
     #[param(inline)]
     layer: LayerName,
@@ -73,6 +83,7 @@ impl From<LayerName> for Layer {
             LayerName::Scanner => Self::Only(LayerId::Sensor(SensorClass::Scanner.into())),
             LayerName::Sonar => Self::Only(LayerId::Sensor(SensorClass::Sonar.into())),
             LayerName::Prior => Self::Only(LayerId::Prior),
+            LayerName::Walls => Self::Only(LayerId::Walls),
         }
     }
 }

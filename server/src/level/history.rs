@@ -13,6 +13,7 @@ use mapfold_map::vector::{Chain, ChainId, Cluster, Segment};
 use rpds::{RedBlackTreeMapSync, RedBlackTreeSetSync};
 
 use super::prior::PriorHistory;
+use super::walls::{self, WallHistory};
 
 /// A key that no other comes before.
 pub(super) trait Least: Ord + Copy {
@@ -163,6 +164,8 @@ pub(crate) struct MapHistory {
     pub(super) slices: History<SliceKey, Tile>,
     /// Tiles of the prior: of the log's imports, not of the fold.
     pub(super) prior: PriorHistory,
+    /// What confirmed walls say, told from the segments.
+    pub(super) walls: WallHistory,
 }
 
 impl MapHistory {
@@ -189,6 +192,8 @@ impl MapHistory {
             self.slices.record(*at, revision, level.sums(at).cloned());
         }
         let map = level.map();
+        let resolution = level.config().resolution;
+        walls::follow(self, &changes.segments, map, resolution, revision);
         ChangeCounts {
             features: all(&mut self.segments, &changes.segments, &map.segments, revision)
                 + all(&mut self.clusters, &changes.clusters, &map.clusters, revision)

@@ -14,6 +14,7 @@ use super::history::{History, Least, MapHistory};
 use super::prior;
 use super::recall::{self, Logged};
 use super::rows;
+use super::walls;
 use crate::store::acts::out_after;
 use crate::store::levels::LevelRow;
 use crate::store::map_rows::{FeatureRow, MapRows, StoredMap, TileRow};
@@ -117,6 +118,7 @@ async fn restore(
         let restored = restored_with_history(&config, &stored, &log, &out);
         Ok(restored.map(|mut folding| {
             folding.history_mut().prior = prior;
+            walls::tell(folding.history_mut(), config.resolution, stored.folded_revision);
             Box::new(folding)
         }))
     })
@@ -192,7 +194,7 @@ async fn mend(
     stored: Arc<StoredMap>,
     mut folding: Box<Folding>,
 ) -> Result<Box<Folding>, StoreError> {
-    let from = stored.folded_revision;
+    let (from, resolution) = (stored.folded_revision, recall::config(row).resolution);
     let (folding, everything) = aside(move || {
         let revision = folding.revision();
         let true_rows = rows::changed(folding.history(), -1, revision)?;
@@ -221,6 +223,7 @@ async fn mend(
         for key in spoilt_tiles {
             redate_one(key, revision, tiles);
         }
+        walls::tell(history, resolution, revision);
         let everything = rows::changed(folding.history(), -1, revision)?;
         Ok((folding, everything))
     })

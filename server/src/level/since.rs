@@ -98,16 +98,23 @@ impl Snapshot {
             removed: Vec::new(),
             prior: Vec::new(),
             removed_prior: Vec::new(),
+            walls: Vec::new(),
+            removed_walls: Vec::new(),
         };
-        for (_, at, tile) in self.history().prior.changed(since, i64::MAX) {
-            if !touches(Some(tile_bounds(at, self.resolution_m())), bbox) {
-                continue;
-            }
-            let place = v1::TilePlace { x: at.x, y: at.y };
-            match tile {
-                Some(_) => answer.prior.push(place),
-                None if since > 0 => answer.removed_prior.push(place),
-                None => {}
+        for (layer, there, removed) in [
+            (&self.history().prior, &mut answer.prior, &mut answer.removed_prior),
+            (&self.history().walls, &mut answer.walls, &mut answer.removed_walls),
+        ] {
+            for (_, at, tile) in layer.changed(since, i64::MAX) {
+                if !touches(Some(tile_bounds(at, self.resolution_m())), bbox) {
+                    continue;
+                }
+                let place = v1::TilePlace { x: at.x, y: at.y };
+                match tile {
+                    Some(_) => there.push(place),
+                    None if since > 0 => removed.push(place),
+                    None => {}
+                }
             }
         }
         for (_, key, tile) in self.history().tiles.changed(since, i64::MAX) {
@@ -131,6 +138,11 @@ impl Snapshot {
     /// Places where the prior changed after `since`, removed tiles included.
     pub fn prior_changed_after(&self, since: i64) -> impl Iterator<Item = TileIndex> {
         self.history().prior.changed(since, i64::MAX).map(|(_, at, _)| at)
+    }
+
+    /// Places where what confirmed walls say changed after `since`, removed tiles included.
+    pub fn walls_changed_after(&self, since: i64) -> impl Iterator<Item = TileIndex> {
+        self.history().walls.changed(since, i64::MAX).map(|(_, at, _)| at)
     }
 
     /// A page of all that changed after `since`: up to `limit` things, or all those of one

@@ -141,6 +141,15 @@ impl Snapshot {
         self.history.prior.live_between(first, last)
     }
 
+    /// The tiles of what confirmed walls say from `first` to `last`, by place.
+    pub fn walls_between(
+        &self,
+        first: TileIndex,
+        last: TileIndex,
+    ) -> impl Iterator<Item = (&TileIndex, &Arc<Tile>)> {
+        self.history.walls.live_between(first, last)
+    }
+
     /// One tile of the prior.
     pub fn prior_tile(&self, at: TileIndex) -> Option<&Arc<Tile>> {
         self.history.prior.get(&at)?.1

@@ -25,3 +25,4 @@ mod reverted_maps;
 mod reverts;
 mod setup;
 mod trust;
+mod walls;

@@ -28,7 +28,8 @@ const SHADES: usize = 1 + RAMPS.len() * STEPS as usize;
 /// The place of a layer's ramp among all.
 fn ramp(layer: LayerId) -> u8 {
     match layer {
-        LayerId::Sensor(SensorClass::Scanner) => 0,
+        // What scanners saw often enough is what confirms a wall.
+        LayerId::Sensor(SensorClass::Scanner) | LayerId::Walls => 0,
         LayerId::Sensor(SensorClass::Sonar) => 1,
         LayerId::Prior => 2,
     }
@@ -37,6 +38,7 @@ fn ramp(layer: LayerId) -> u8 {
 /// The ramp of a cell of which several layers may speak: that of the first.
 fn first_to_speak(said: Said) -> u8 {
     let layer = match said {
+        Said { walls, .. } if walls.0 != 0 => LayerId::Walls,
         Said { scanner: LogOdds(0), sonar: LogOdds(0), .. } => LayerId::Prior,
         Said { scanner: LogOdds(0), .. } => LayerId::Sensor(SensorClass::Sonar),
         Said { .. } => LayerId::Sensor(SensorClass::Scanner),
