@@ -25,6 +25,7 @@ mod state;
 
 mod contributions;
 mod docs;
+mod drawing;
 mod events;
 mod exports;
 #[cfg(test)]

@@ -13,7 +13,7 @@ use mapfold_schema::route;
 use mapfold_schema::v1::{
     Contribution, EvidencePatch, PoseEstimate, Provenance, RasterChanges, SensorClass, TilePatch,
 };
-use tokio::time::Instant;
+use tokio::time::{Duration, Instant};
 use uuid::Uuid;
 
 use crate::api::Api;
@@ -212,6 +212,27 @@ async fn lists(
     Ok((report::table(&header, &rows), faults))
 }
 
+/// Whether the server has no level's pictures left to draw in the background.
+async fn is_drawn(api: &Api) -> Result<bool, Error> {
+    let figures = api.get("/metrics", "*/*").await?.expect(200)?.text();
+    let left = figures.lines().find_map(|line| line.strip_prefix("mapfold_levels_to_draw "));
+    Ok(left.and_then(|left| left.parse().ok()) == Some(0.0))
+}
+
+/// Starts the server again, opens the level and waits until its coarse pictures are drawn; how long that
+/// takes from when the level is open, seconds.
+async fn reopened(server: &mut Server, api: &Api, place: &Place) -> Result<f64, Error> {
+    server.stop().await?;
+    server.start_again().await?;
+    // Opening the level is no part of drawing.
+    place.level.folded().await?;
+    let begin = Instant::now();
+    while !is_drawn(api).await? {
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    Ok(begin.elapsed().as_secs_f64())
+}
+
 /// Pictures of every zoom level of the largest level: from a server that has just started, again,
 /// and after a tile in them has changed.
 async fn pictures(
@@ -221,12 +242,16 @@ async fn pictures(
     place: &mut Place,
 ) -> Result<String, Error> {
     let tiles = SIZES[2];
+    // The worst that can be asked for: the coarsest picture, the moment that the level is open.
+    server.stop().await?;
+    server.start_again().await?;
+    place.level.folded().await?;
+    let mut at_once = Asked::default();
+    at_once.ask(api, &picture(place, 0, (0, 0))).await?;
     let mut rows = Vec::new();
+    let mut drawn_s = Vec::new();
     for z in 0..=ZOOM_MAX {
-        server.stop().await?;
-        server.start_again().await?;
-        // Opening the level is no part of drawing.
-        place.level.folded().await?;
+        drawn_s.push(reopened(server, api, place).await?);
         let chosen: BTreeSet<String> = (0..PICTURES)
             .map(|_| {
                 let at = place.somewhere(tiles);
@@ -279,7 +304,14 @@ async fn pictures(
         "again of the file",
         "changed of the file",
     ];
-    Ok(report::table(&header, &rows))
+    let words = format!(
+        "Coarse pictures of all layers are drawn {:.1} s (median of {}) after the level is open; the coarsest, \
+         asked for the moment that it is, takes {:.0} ms.\n",
+        quantile(&drawn_s, 0.5),
+        drawn_s.len(),
+        at_once.at(0.5),
+    );
+    Ok(format!("{words}\n{}", report::table(&header, &rows)))
 }
 
 /// The path of the picture of a zoom level that shows a tile.

@@ -11,7 +11,8 @@
 //! own (orange against blue), and what only the prior does has none (grey).
 //!
 //! Up to `ZOOM_COARSE` a picture is made of the four below it, which are kept: one that shows a
-//! hundred thousand tiles costs what has changed in it, not what is in it.
+//! hundred thousand tiles costs what has changed in it, not what is in it; and all of them can be drawn
+//! before anybody asks ([`PictureCache::draw_ahead`]).
 
 mod cache;
 mod pyramid;
@@ -63,6 +64,12 @@ impl Address {
         Some(Self { z, row, col: tile.x.div_euclid(along) })
     }
 
+    /// The picture of the next coarser zoom level that shows the same; `None` for the coarsest.
+    fn whole(self) -> Option<Self> {
+        let z = self.z.checked_sub(1)?;
+        Some(Self { z, row: self.row.div_euclid(2), col: self.col.div_euclid(2) })
+    }
+
     /// The four pictures of the next zoom level that show the same: those above first, from left
     /// to right. `None` for those without a number.
     fn parts(self) -> [Option<Self>; 4] {
@@ -108,7 +115,10 @@ impl Address {
     /// The picture's pixels from the shades of its tiles.
     fn pixels<'a>(self, tiles: impl IntoIterator<Item = (TileIndex, &'a Shades)>) -> Vec<u8> {
         let side = self.block().min(TILE_SIDE);
-        self.paste_all(tiles.into_iter().map(|(tile, shades)| (tile, shades.at_side(side))))
+        let mut pixels = vec![0; PICTURE_PIXELS];
+        let tiles = tiles.into_iter().map(|(tile, shades)| (tile, shades.at_side(side)));
+        self.paste_all(&mut pixels, tiles);
+        pixels
     }
 
     /// Pixels along a tile's side in this picture.
@@ -116,20 +126,22 @@ impl Address {
         PICTURE_SIDE >> (ZOOM_MAX - self.z)
     }
 
-    /// The picture's pixels from those of its tiles, at the size that they have in it (or as cells).
-    fn paste_all<T: AsRef<[u8]>>(self, tiles: impl IntoIterator<Item = (TileIndex, T)>) -> Vec<u8> {
-        let mut pixels = vec![0_u8; PICTURE_PIXELS];
+    /// Puts tiles into the picture's pixels, at the size that they have in it (or as cells).
+    fn paste_all<T: AsRef<[u8]>>(
+        self,
+        pixels: &mut [u8],
+        tiles: impl IntoIterator<Item = (TileIndex, T)>,
+    ) {
         let block = self.block();
         if let Some((xs, ys)) = self.tiles() {
             for (tile, shades) in tiles {
                 if xs.contains(&tile.x) && ys.contains(&tile.y) {
                     let left = tile.x.abs_diff(*xs.start()) as usize * block;
                     let top = ys.end().abs_diff(tile.y) as usize * block;
-                    paste(&mut pixels, left, top, block, shades.as_ref());
+                    paste(pixels, left, top, block, shades.as_ref());
                 }
             }
         }
-        pixels
     }
 }
 

@@ -166,7 +166,10 @@ impl<S: Needs> FromRequestParts<App> for LevelFor<S> {
             return Err(ApiError::MissingScope(S::SCOPE));
         }
         match app.parts.levels.open(&site, &level).await? {
-            Some(level) => Ok(Self { caller, level, scope: PhantomData }),
+            Some(level) => {
+                app.drawing.begin(app, &level);
+                Ok(Self { caller, level, scope: PhantomData })
+            }
             None => Err(ApiError::not_found("level", format!("{site}/{level}"))),
         }
     }

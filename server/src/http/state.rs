@@ -5,6 +5,7 @@ use std::sync::Arc;
 use mapfold_schema::border::{DEFAULT_LIMITS, Limits};
 use tokio::sync::{Semaphore, watch};
 
+use super::drawing::Drawing;
 use super::observe::Metrics;
 use crate::chance::Chance;
 use crate::clock::SharedClock;
@@ -43,6 +44,7 @@ pub struct Inner {
     pub(super) parts: Parts,
     pub(super) upload_limits: Limits,
     pub(super) pictures: PictureCache,
+    pub(super) drawing: Drawing,
     pub(super) metrics: Metrics,
     pub(super) streams: Arc<Semaphore>,
     pub(super) exports: Semaphore,
@@ -56,6 +58,7 @@ impl App {
             exports: Semaphore::new(EXPORTS_MAX),
             upload_limits: DEFAULT_LIMITS,
             pictures: PictureCache::default(),
+            drawing: Drawing::default(),
             metrics: Metrics::default(),
             parts,
         }))

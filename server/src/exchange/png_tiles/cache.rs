@@ -5,7 +5,7 @@
 //! tiles are shaded again. A tile is recognised by its place in memory: a weak reference keeps
 //! that place from being used for another tile, but does not keep the tile.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
 
 use mapfold_map::raster::{Tile, TileIndex};
@@ -113,6 +113,35 @@ impl PictureCache {
         Ok(picture)
     }
 
+    /// Draws all coarse pictures of a layer that show anything, from the finest up, so that nobody who
+    /// asks for them has to wait; how many there are. `newest` gives the raster to draw from, anew for
+    /// each picture, until there is none.
+    ///
+    /// # Errors
+    /// A fault of the encoder.
+    pub fn draw_ahead<R: Dated>(
+        &self,
+        frame: Uuid,
+        layer: Layer,
+        newest: impl Fn() -> Option<Arc<R>>,
+    ) -> Result<usize, png::EncodingError> {
+        let Some(raster) = newest() else { return Ok(0) };
+        let tiles = layer.parts().flat_map(|part| raster.tiles_of(part)).map(|(at, _)| at);
+        let mut next: BTreeSet<Address> =
+            tiles.filter_map(|at| Address::showing(ZOOM_COARSE, at)).collect();
+        drop(raster);
+        let mut drawn = 0;
+        while !next.is_empty() {
+            for address in &next {
+                let Some(raster) = newest() else { return Ok(drawn) };
+                self.pyramid.picture(&self.shading, (frame, layer), &*raster, *address)?;
+                drawn += 1;
+            }
+            next = next.into_iter().filter_map(Address::whole).collect();
+        }
+        Ok(drawn)
+    }
+
     fn blank(&self) -> Result<Arc<Picture>, png::EncodingError> {
         if let Some(blank) = self.blank.get() {
             return Ok(Arc::clone(blank));
@@ -134,6 +163,12 @@ impl PictureCache {
         let shaded = Arc::new(Shaded { serial: kept.serial, tiles, shades });
         kept.shades.insert(key, Arc::clone(&shaded), SHADES_MAX);
         shaded
+    }
+
+    /// The coarse pictures.
+    #[cfg(test)]
+    pub(super) fn pyramid(&self) -> &Pyramid {
+        &self.pyramid
     }
 
     fn kept(&self) -> MutexGuard<'_, Kept> {

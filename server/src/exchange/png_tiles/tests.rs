@@ -31,6 +31,11 @@ impl Dated for World {
 }
 
 impl World {
+    /// Where tiles are.
+    pub(super) fn tiles_at(&self) -> std::collections::BTreeSet<TileIndex> {
+        self.map.tiles.keys().map(|key| key.tile).collect()
+    }
+
     /// Puts a tile in the place of another, or takes it away, as one revision.
     pub(super) fn put(&mut self, key: TileKey, tile: Option<Arc<Tile>>) {
         match tile {

@@ -2,7 +2,7 @@
 
 use mapfold_map::raster::{Cell, SensorClass, TILE_CELLS, TileIndex, TileKey};
 
-use super::super::shades::COARSE_SIDE;
+use super::super::cache::PictureCache;
 use super::super::tests::{World, map_of};
 use super::super::{Shades, ZOOM_MAX};
 use super::*;
@@ -116,8 +116,28 @@ fn a_change_costs_its_surroundings_however_large_the_level() {
     let key = TileKey { class: SensorClass::Scanner, tile: place };
     world.put(key, Some(Arc::new(Tile::new(Box::new([300; TILE_CELLS])))));
     assert_ne!(draw(&world).unwrap().digest, first.digest);
-    let around = Address::showing(ZOOM_COARSE, place).unwrap().select(&world, Layer::All).len();
-    assert_eq!(pyramid.shaded() - cold, around as u64);
+    assert_eq!(pyramid.shaded() - cold, 1, "one tile is painted anew");
+    // What has gone is painted over; and a canvas that is left without anything is none.
+    world.put(key, None);
+    let draw_part = |world: &World| {
+        let part = Address::showing(ZOOM_COARSE, place).unwrap();
+        pyramid.picture(&shading, OF, world, part).unwrap()
+    };
+    assert_eq!(draw(&world).unwrap().digest, first.digest);
+    let tiles = Address::showing(ZOOM_COARSE, place).unwrap().select(&world, Layer::All);
+    let keys: Vec<TileKey> = tiles
+        .iter()
+        .flat_map(|(at, layers)| layers.iter().map(|(id, _)| (*at, *id)))
+        .filter_map(|(tile, id)| match id {
+            LayerId::Sensor(class) => Some(TileKey { class, tile }),
+            _ => None,
+        })
+        .collect();
+    assert!(keys.len() > 5 && draw_part(&world).is_some());
+    for key in keys {
+        world.put(key, None);
+    }
+    assert!(draw_part(&world).is_none());
 }
 
 #[test]
@@ -152,4 +172,33 @@ fn layers_and_levels_are_kept_apart() {
         draw((Uuid::max(), Layer::All), &other).unwrap().digest,
         draw(OF, &one).unwrap().digest
     );
+}
+
+#[test]
+fn what_was_drawn_ahead_is_all_that_there_is_and_is_not_drawn_again() {
+    let (world, cache) = (Arc::new(world()), PictureCache::default());
+    let drawn = cache.draw_ahead(Uuid::nil(), Layer::All, || Some(Arc::clone(&world))).unwrap();
+    let cold = cache.pyramid().shaded();
+    assert_eq!(cold, world.tiles_at().len() as u64, "each tile once");
+    let mut known = BTreeSet::new();
+    for tile in world.tiles_at() {
+        for z in 0..=ZOOM_COARSE {
+            let address = Address::showing(z, tile).unwrap();
+            let picture = cache.picture(Uuid::nil(), &*world, address, Layer::All).unwrap();
+            known.insert(address);
+            assert_ne!(picture.digest, blank(&cache, &world).digest);
+        }
+    }
+    assert_eq!((cache.pyramid().shaded(), known.len()), (cold, drawn));
+
+    // Whoever has no raster any more is done.
+    let rasters = Mutex::new(vec![Arc::clone(&world); 4]);
+    let stopped = PictureCache::default();
+    let drawn = stopped.draw_ahead(Uuid::nil(), Layer::All, || rasters.lock().unwrap().pop());
+    assert_eq!(drawn.unwrap(), 3);
+}
+
+fn blank(cache: &PictureCache, world: &World) -> Arc<Picture> {
+    let nowhere = Address::new(ZOOM_COARSE, 9999, 9999).unwrap();
+    cache.picture(Uuid::nil(), world, nowhere, Layer::All).unwrap()
 }
