@@ -805,15 +805,27 @@ export interface components {
              * @description Pixels that speak for free space.
              */
             free: number;
+            /**
+             * Format: double
+             * @description Up to this darkness it is free.
+             */
+            free_thresh?: number | null;
             /** @description Name of the image's file, as the description has it. */
             image: string;
             /** @description `trinary`, `scale` or `raw`. */
             mode: string;
+            /** @description Whether brightness counts instead of darkness. */
+            negate?: boolean | null;
             /**
              * Format: int64
              * @description Pixels that speak for an obstacle.
              */
             occupied: number;
+            /**
+             * Format: double
+             * @description From this darkness on a pixel is occupied, 0 to 1; absent in imports that are older than this.
+             */
+            occupied_thresh?: number | null;
             /** @description Where the lower left corner of the image lies in the level. */
             origin_m: number[];
             /**

@@ -5,6 +5,9 @@ import type { Place } from "./permalink";
 import type { Evidence, PictureAddress } from "./pyramid";
 import type {
   ContributionPage,
+  Import,
+  ImportPage,
+  ImportReport,
   LevelDescription,
   NewRevert,
   Problem,
@@ -67,6 +70,14 @@ export interface Api {
   /** What either would change. */
   previewRevert: (place: Place, revert: NewRevert, signal: AbortSignal) => Promise<RevertPreview>;
   previewUndo: (place: Place, id: string, signal: AbortSignal) => Promise<RevertPreview>;
+  /** The newest imports. */
+  imports: (place: Place, signal: AbortSignal) => Promise<ImportPage>;
+  /** What is in a map: a zip of a YAML and its image. */
+  previewImport: (place: Place, zip: Blob, trust: number, signal: AbortSignal) => Promise<ImportReport>;
+  /** Makes it the prior of the level. */
+  importPrior: (place: Place, zip: Blob, trust: number) => Promise<Import>;
+  /** Takes the prior away. */
+  removePrior: (place: Place) => Promise<Import>;
   vector: (place: Place, since: number, signal: AbortSignal) => Promise<VectorPatch>;
   raster: (place: Place, since: number, signal: AbortSignal) => Promise<RasterChanges>;
   /** One picture of the raster; null where there is nothing to see. */
@@ -100,6 +111,10 @@ export function isAborted(error: unknown): boolean {
 
 function posted(body: object): RequestInit {
   return { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) };
+}
+
+function zip(body: Blob): RequestInit {
+  return { method: "POST", headers: { "content-type": "application/zip" }, body };
 }
 
 async function problemOf(response: Response): Promise<Problem | null> {
@@ -171,6 +186,11 @@ export function createApi(browser: Browser): Api {
       askJson(`${levelPath(place)}/reverts?preview=true`, { ...posted(revert), signal }),
     previewUndo: (place, id, signal) =>
       askJson(`${levelPath(place)}/reverts/${encodeURIComponent(id)}?preview=true`, { method: "DELETE", signal }),
+    imports: (place, signal) => askJson(`${levelPath(place)}/imports`, { signal }),
+    previewImport: (place, map, trust, signal) =>
+      askJson(`${levelPath(place)}/imports?preview=true&trust=${trust}`, { ...zip(map), signal }),
+    importPrior: (place, map, trust) => askJson(`${levelPath(place)}/imports?trust=${trust}`, zip(map)),
+    removePrior: (place) => askJson(`${levelPath(place)}/imports`, { method: "DELETE" }),
     vector: (place, since, signal) => askJson(`${levelPath(place)}/vector?since=${since}`, { signal }),
     raster: (place, since, signal) => askJson(`${levelPath(place)}/raster?since=${since}`, { signal }),
     picture: async (place, picture, evidence) => {

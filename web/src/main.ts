@@ -5,6 +5,7 @@ import { createApi } from "./api";
 import { setShown } from "./dom";
 import { createFacts } from "./facts";
 import { followLevel } from "./feed";
+import { createImportActions } from "./importing";
 import { createMapView } from "./map/view";
 import { DARK, LIGHT, type Theme } from "./palette";
 import { createContributionsCard } from "./panels/contributions_card";
@@ -14,6 +15,7 @@ import { createLevelCard } from "./panels/level_card";
 import { createLogPanel } from "./panels/log_panel";
 import { createMapTools, ZOOM_STEP } from "./panels/map_tools";
 import { createMessages } from "./panels/messages";
+import { createPriorCard } from "./panels/prior_card";
 import { createRobotsCard } from "./panels/robots_card";
 import { createSelectionCard } from "./panels/selection_card";
 import { createSignIn } from "./panels/sign_in";
@@ -71,11 +73,13 @@ const page = byId("page");
 const panels = byId("panels");
 const overMap = byId("over-map");
 const log = createLogActions({ api, state: store.state, dispatch, uuid: () => uuidFrom(crypto.getRandomValues(new Uint8Array(16))) });
+const prior = createImportActions({ api, state: store.state, dispatch });
 const draws = [
   createHeader({ parent: byId("header"), store, onSignOut: () => void signOut(api, dispatch) }),
   createLevelCard(panels),
   createRobotsCard(panels, { store, theme }),
   createLayersCard(panels, store),
+  createPriorCard(panels, prior),
   createContributionsCard(panels, { store, theme, onOpenLog: log.open }),
   createLogPanel({ parent: page, store, theme, actions: log }),
   createSelectionCard(overMap, store),
@@ -121,6 +125,7 @@ store.onChange((state, before) => {
 });
 store.onChange((state, before) => {
   if (state.log.open && before.contributions !== state.contributions) log.refresh();
+  if (state.imports.open && before.level !== state.level) prior.refresh();
 });
 store.onChange((state) => {
   if (state.session.kind !== "in" || state.place === null) return;

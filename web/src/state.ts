@@ -6,6 +6,7 @@ import type { LayerName, Layers, LayerSetting } from "./layers";
 import { withSlots } from "./palette";
 import type { Permalink, Place, View } from "./permalink";
 import type { Evidence } from "./pyramid";
+import { NO_IMPORTS, type ImportsState } from "./imports";
 import { NO_LOG, type LogState } from "./reverts";
 import type {
   ContributionEntry,
@@ -58,6 +59,7 @@ export interface State {
   /** The newest ones; null until they are known. */
   contributions: readonly ContributionEntry[] | null;
   log: LogState;
+  imports: ImportsState;
   link: Link;
   layers: Layers;
   evidence: Evidence;
@@ -83,6 +85,7 @@ export type Event =
   | { kind: "robots"; robots: readonly RobotDescription[] }
   | { kind: "contributions"; contributions: readonly ContributionEntry[] }
   | { kind: "log"; log: Partial<LogState> }
+  | { kind: "imports"; imports: Partial<ImportsState> }
   | { kind: "heard"; robots: readonly string[]; atMs: number }
   | { kind: "link"; link: Link }
   | { kind: "layer"; name: LayerName; setting: Partial<LayerSetting> }
@@ -105,6 +108,7 @@ const NO_LEVEL = {
   slots: new Map<string, number>(),
   contributions: null,
   log: NO_LOG,
+  imports: NO_IMPORTS,
   link: { kind: "idle" },
   selection: null,
   pointer: null,
@@ -165,6 +169,8 @@ export function update(state: State, event: Event): State {
       };
     case "log":
       return { ...state, log: { ...state.log, ...event.log } };
+    case "imports":
+      return { ...state, imports: { ...state.imports, ...event.imports } };
     case "heard":
       return { ...state, heardAtMs: withHeard(state.heardAtMs, event.robots, event.atMs) };
     case "link":

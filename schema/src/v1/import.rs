@@ -23,6 +23,15 @@ pub struct ImportReport {
     pub yaw_rad: f64,
     /// `trinary`, `scale` or `raw`.
     pub mode: String,
+    /// From this darkness on a pixel is occupied, 0 to 1; absent in imports that are older than this.
+    #[serde(default)]
+    pub occupied_thresh: Option<f64>,
+    /// Up to this darkness it is free.
+    #[serde(default)]
+    pub free_thresh: Option<f64>,
+    /// Whether brightness counts instead of darkness.
+    #[serde(default)]
+    pub negate: Option<bool>,
     /// How much it is trusted, 0 to 1.
     pub trust: f64,
     /// Pixels that speak for an obstacle.

@@ -286,6 +286,54 @@ describe("the operator", () => {
     expect(await page.textContent(".selection")).toContain("SICK LMS200, up to 15 m");
   });
 
+  it("imports a map after seeing what is in it, and takes it away again", async () => {
+    await open(SIGNED_IN);
+    await caughtUp();
+    await page.click(".prior-card summary");
+    await page.waitForSelector("text=There is none.");
+    const choose = async (yaml: string): Promise<void> => {
+      await page.setInputFiles("#prior-yaml", { name: "floor.yaml", mimeType: "text/yaml", buffer: Buffer.from(yaml) });
+    };
+    expect(await page.isDisabled("#prior-preview")).toBe(true);
+    const pgm = Buffer.from("P5\n40 20\n255\n" + "\xfe".repeat(800), "latin1");
+    await page.setInputFiles("#prior-image", { name: "floor.pgm", mimeType: "image/x-portable-graymap", buffer: pgm });
+
+    // What is wrong is told with its place, and nothing is imported.
+    await choose("image: floor.pgm\nresolution: fine\n");
+    await page.click("#prior-preview");
+    await page.waitForSelector(".prior-card .problem:has-text('line 2, column 13')");
+    expect(await page.isVisible("#prior-confirm")).toBe(false);
+
+    await choose("image: floor.pgm\nresolution: 0.05\n");
+    await page.fill("#prior-trust", "0.8");
+    await page.click("#prior-preview");
+    await page.waitForSelector(".prior-told");
+    expect(await page.isVisible(".prior-card .problem")).toBe(false);
+    const told = await page.innerText(".prior-told");
+    for (const words of ["floor.pgm, 40 × 20 pixels", "5 cm a pixel", "x -1.50 m, y 2.25 m", "trinary", "0.65", "0.196", "0.8"]) {
+      expect(told).toContain(words);
+    }
+    expect(await page.innerText(".prior-warnings")).toContain("yaw is 0");
+    expect(mock.prior.imports).toHaveLength(0);
+
+    // Another trust is another question.
+    await page.fill("#prior-trust", "0.7");
+    expect(await page.isVisible("#prior-confirm")).toBe(false);
+    await page.click("#prior-preview");
+    await page.click("#prior-confirm");
+    await page.waitForSelector(".prior-card .done:has-text('It is the prior')");
+    expect(mock.prior.imports.map(({ report }) => report?.trust)).toEqual([0.7]);
+    await page.waitForSelector(".imports li:has-text('floor.pgm: 1 tile, trust 0.7')");
+
+    await page.click("#prior-remove");
+    await page.waitForSelector(".imports li:has-text('Prior taken away')");
+    await page.waitForSelector("text=There is none.");
+    expect(await page.isVisible("#prior-remove")).toBe(false);
+    // A refusal that was asked for is a line of the console; there is no other.
+    expect(complaints.filter((text) => !text.includes("422"))).toEqual([]);
+    expect(strays).toEqual([]);
+  });
+
   it("has all of it on a tablet too", async () => {
     await open(SIGNED_IN, { width: 800, height: 1100 });
     await caughtUp();

@@ -5,6 +5,7 @@ import { createServer } from "node:http";
 import { readFile } from "node:fs/promises";
 import { extname, join, normalize } from "node:path";
 import { fileURLToPath } from "node:url";
+import { createMockImports } from "./imports.mjs";
 import { createMockLevel } from "./level.mjs";
 import { drawPicture } from "./picture.mjs";
 
@@ -36,11 +37,17 @@ function problem(status, detail) {
   return { status, headers: { "content-type": "application/problem+json" }, body: JSON.stringify(body) };
 }
 
+/** @param {Request} request @returns {Promise<Buffer>} */
+async function bytesOf(request) {
+  /** @type {Buffer[]} */
+  const parts = [];
+  for await (const part of /** @type {AsyncIterable<Buffer>} */ (request)) parts.push(part);
+  return Buffer.concat(parts);
+}
+
 /** @param {Request} request @returns {Promise<string>} */
 async function bodyOf(request) {
-  let text = "";
-  for await (const part of /** @type {AsyncIterable<Buffer>} */ (request)) text += part.toString("utf8");
-  return text;
+  return (await bytesOf(request)).toString("utf8");
 }
 
 /**
@@ -48,6 +55,7 @@ async function bodyOf(request) {
  */
 export function createMockServer({ nowMs = Date.now, noSites = false } = {}) {
   const ground = createMockLevel({ nowMs });
+  const prior = createMockImports({ nowMs });
   /** @type {Set<Response>} */
   const streams = new Set();
   /** Paths asked for, in order. @type {string[]} */
@@ -102,6 +110,16 @@ export function createMockServer({ nowMs = Date.now, noSites = false } = {}) {
       const page = ground.contributions(Number(url.searchParams.get("limit") ?? 50), url.searchParams.get("robot"));
       return json({ contributions: isGround ? page : [], next: null });
     }
+    if (rest === "/imports" && request.method === "POST") {
+      const report = prior.read(await bytesOf(request), Number(url.searchParams.get("trust") ?? 0.5));
+      if (typeof report === "string") return problem(422, report);
+      return json(url.searchParams.get("preview") === "true" ? report : prior.make(report));
+    }
+    if (rest === "/imports" && request.method === "DELETE") {
+      const removed = prior.remove();
+      return removed === null ? problem(404, "There is no prior.") : json(removed);
+    }
+    if (rest === "/imports") return json({ imports: isGround ? prior.imports : [], next: null });
     if (rest === "/events") {
       response.writeHead(200, { "content-type": "text/event-stream", "cache-control": "no-store" });
       response.write("retry: 3000\n\n");
@@ -148,6 +166,7 @@ export function createMockServer({ nowMs = Date.now, noSites = false } = {}) {
 
   return {
     ground,
+    prior,
     requests,
     /** @param {number} [port] @returns {Promise<string>} where the page is */
     listen: (port = 0) =>

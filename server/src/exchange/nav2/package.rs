@@ -123,6 +123,9 @@ impl Package {
             origin_m: [x, y],
             yaw_rad: yaw,
             mode: description.mode.word().to_owned(),
+            occupied_thresh: Some(description.occupied_thresh),
+            free_thresh: Some(description.free_thresh),
+            negate: Some(description.negate),
             trust: trust.get(),
             occupied: count(|value| value > 50),
             free: count(|value| (0..50).contains(&value)),
@@ -202,6 +205,8 @@ mod tests {
         let Import { prior, report } = package.import(0.05, Trust::STANDARD).unwrap();
         assert_eq!((report.occupied, report.free, report.unknown, report.tiles), (1, 2, 0, 1));
         assert_eq!((report.columns, report.rows, report.image.as_str()), (3, 1, "maps/floor.pgm"));
+        assert_eq!((report.occupied_thresh, report.free_thresh), (Some(0.65), Some(0.25)));
+        assert_eq!(report.negate, Some(false));
         assert!(report.warnings[0].contains("grey 205"), "{:?}", report.warnings);
         assert_eq!(report.bounds, bounds(&prior, 0.05));
         assert_eq!(&prior.tiles[&TileIndex { x: 0, y: 0 }].cells()[..4], [200, -25, -25, 0]);
