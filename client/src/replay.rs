@@ -25,11 +25,13 @@ use tokio::time::Instant;
 
 use crate::log::carmen;
 use crate::robot::at_rest::{self, AtRestConfig};
-use crate::robot::{OdometryNoise, PoseSd, PoseSource, Surveyor, SurveyorConfig, SurveyorError};
+use crate::robot::{
+    MappedWalls, OdometryNoise, PoseSd, PoseSource, Surveyor, SurveyorConfig, SurveyorError,
+};
 use crate::sensor::Sensors;
 use crate::sync::{
-    Api, ApiError, LevelAddress, Outbox, OutboxConfig, OutboxError, UploadConfig, UploadProgress,
-    UploadSummary, Uploader,
+    Api, ApiError, LevelAddress, Mirror, MirrorConfig, MirrorError, Outbox, OutboxConfig,
+    OutboxError, UploadConfig, UploadProgress, UploadSummary, Uploader,
 };
 
 pub use enrolment::Enrolment;
@@ -66,6 +68,9 @@ pub struct ReplayOptions {
     pub provenance: Provenance,
     /// The outbox's folder; one of its own for robot and level under `./mapfold-robot-data` if absent.
     pub outbox: Option<PathBuf>,
+    /// The folder of a mirror, which is brought up to date first: its walls then tell which echoes of sonars are
+    /// ghosts. Nothing is known beforehand if absent.
+    pub mirror: Option<PathBuf>,
     /// How to upload.
     pub upload: UploadConfig,
 }
@@ -86,6 +91,7 @@ impl ReplayOptions {
             pose_sd: PoseSd::CORRECTED_LOG,
             provenance: Provenance::SharedMap,
             outbox: None,
+            mirror: None,
             upload: UploadConfig::STANDARD,
         }
     }
@@ -156,6 +162,9 @@ pub enum ReplayError {
     /// The outbox failed.
     #[error(transparent)]
     Outbox(#[from] OutboxError),
+    /// The mirror cannot be used.
+    #[error("the mirror: {0}")]
+    Mirror(#[from] MirrorError),
     /// A contribution cannot be encoded.
     #[error(transparent)]
     Encode(#[from] EncodeError),
@@ -214,9 +223,13 @@ pub async fn run(
         tracing::warn!(?reconciled, "the server was set back to an older state; sending again");
     }
 
+    let walls = match &options.mirror {
+        Some(folder) => Some(mapped_walls(folder.clone(), &options.level, &api).await?),
+        None => None,
+    };
     let surveyor = Surveyor::new(config(level.resolution_m), first)?;
     let of_log = log.summary.clone();
-    let producer = Producer::new(log, numbers, surveyor, level.frame, Arc::clone(&outbox));
+    let producer = Producer::new(log, numbers, surveyor, walls, level.frame, Arc::clone(&outbox));
     let uploader =
         Uploader::new(api.clone(), Arc::clone(&outbox), options.level.clone(), options.upload);
     let (surveyed, summary) = play(producer, &uploader, options.speed, &mut rng, progress).await?;
@@ -225,6 +238,27 @@ pub async fn run(
         return Err(ReplayError::NothingPlaced(surveyed.why_nothing()));
     }
     Ok(report)
+}
+
+/// The walls of the level as they are now or, if the server cannot be reached, as the mirror in this folder
+/// has them since it last could.
+async fn mapped_walls(
+    folder: PathBuf,
+    level: &LevelAddress,
+    api: &Api,
+) -> Result<MappedWalls, ReplayError> {
+    let of_level = level.clone();
+    let open = move || Mirror::open(&folder, &of_level, MirrorConfig::STANDARD);
+    let mut mirror = worker(open).await??;
+    match mirror.refresh(api).await {
+        Err(error) if error.is_retryable() && mirror.frame().is_some() => {
+            tracing::warn!(%error, revision = mirror.revision(), "walls are taken from the mirror as it was");
+        }
+        outcome => {
+            outcome?;
+        }
+    }
+    Ok(MappedWalls::of(mirror.map()))
 }
 
 /// Surveys and uploads side by side until both are done, or the upload cannot go on.

@@ -7,6 +7,7 @@
 pub mod at_rest;
 mod identity;
 mod look;
+mod mapped_walls;
 mod odometry;
 
 use std::sync::Arc;
@@ -17,6 +18,7 @@ use mapfold_schema::v1;
 
 pub use identity::Identity;
 pub use look::Look;
+pub use mapped_walls::MappedWalls;
 pub use odometry::{DeadReckoning, OdometryNoise};
 
 pub use crate::evidence::SonarVerdicts;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use mapfold_schema::route;
 use mapfold_schema::v1::{RobotDescription, SensorClass, SensorKind};
 use mapfold_tests::Error;
-use mapfold_tests::carmen::{self, Log};
+use mapfold_tests::carmen::{self, Log, Scan};
 use mapfold_tests::database::Database;
 use mapfold_tests::floor::Floor;
 use mapfold_tests::level::{Level, Replica};
@@ -94,5 +94,54 @@ async fn a_ring_emulated_from_a_laser_is_labelled_and_frees_its_way() -> Result<
         log.scans[2600..2800].iter().map(|scan| (scan.origin.x, scan.origin.y)).collect();
     let share = free_share(&floor, &places);
     assert!(share > 0.9, "only {share:.2} of the robot's own way is free");
+    Ok(())
+}
+
+/// A ring of two that look square to the sides and hear everything by a detour: a metre too far.
+fn detours(log: &Log, part: std::ops::Range<usize>) -> String {
+    let of = |scan: &Scan| {
+        let (x, y, heading, time) = (scan.origin.x, scan.origin.y, scan.heading, scan.time);
+        let heard = |range: Option<&f64>| range.filter(|r| **r < 3.0).map_or(0.0, |r| r + 1.0);
+        let [right, left] = [scan.ranges.first(), scan.ranges.last()].map(heard);
+        format!(
+            "ODOM {x} {y} {heading} 0 0 0 {time} ring {time}\n\
+             SONAR 0.436332 2 {right} {left} 0 0 -1.570796 0 0 1.570796 {time} ring {time}\n"
+        )
+    };
+    log.scans[part].iter().map(of).collect()
+}
+
+#[tokio::test]
+async fn a_robot_with_a_mirror_knows_echoes_from_behind_walls_for_ghosts() -> Result<(), Error> {
+    let server = Server::start(Database::Sqlite).await?;
+    let target = Target {
+        url: server.url(),
+        token: server.admin_token().to_owned(),
+        site: "mit".to_owned(),
+        level: "infinite-corridor".to_owned(),
+    };
+    let log = Log::read(&data("killian.log.gz"))?;
+    let part = server.folder().join("part.log.gz");
+    log.write_part(2600, 2700, &part)?;
+    Robot::new("clara", &part).start(&target, server.folder())?.finish().await?;
+
+    let heard = server.folder().join("detours.log");
+    std::fs::write(&heard, detours(&log, 2600..2700)).map_err(|e| Error::file(&heard, e))?;
+    let told = async |name: &str, options: &[&str]| -> Result<[u64; 2], Error> {
+        let report = server.folder().join(format!("{name}.json"));
+        let told = ["--report", report.to_str().expect("a path of letters")];
+        let robot = Robot::new(name, &heard).with(&told).with(options);
+        robot.start(&target, server.folder())?.finish().await?;
+        let text = std::fs::read(&report).map_err(|e| Error::file(&report, e))?;
+        let report: serde_json::Value = serde_json::from_slice(&text).expect("a report");
+        let count = |name: &str| report["sonar"][name].as_u64().expect("a count");
+        Ok([count("readings"), count("ghost")])
+    };
+    let mirror = server.folder().join("mirror");
+    let [readings, ghosts] =
+        told("warned", &["--mirror", mirror.to_str().expect("a path of letters")]).await?;
+    assert!(readings >= 100, "{readings} readings");
+    assert!(2 * ghosts > readings, "only {ghosts} of {readings} are known for ghosts");
+    assert_eq!(told("unwarned", &[]).await?[1], 0);
     Ok(())
 }

@@ -89,6 +89,10 @@ pub(super) struct Replay {
     /// Folder of the durable outbox; one under ./mapfold-robot-data if absent.
     #[arg(long, value_name = "DIR")]
     outbox: Option<PathBuf>,
+    /// Folder of a mirror of the level, made or brought up to date first: walls that scanners have found tell
+    /// which echoes of sonars come from behind them.
+    #[arg(long, value_name = "DIR")]
+    mirror: Option<PathBuf>,
     /// Give up after so many seconds; never if absent.
     #[arg(long, value_name = "SECONDS")]
     give_up_after: Option<u64>,
@@ -140,6 +144,7 @@ impl Replay {
                 Claim::Datum => Provenance::Datum,
             },
             outbox: self.outbox.clone(),
+            mirror: self.mirror.clone(),
             upload: UploadConfig {
                 deadline: self.give_up_after.map(Duration::from_secs),
                 ..UploadConfig::STANDARD

@@ -9,8 +9,9 @@ use tokio::time::{Instant, sleep_until};
 use uuid::Uuid;
 
 use super::{AHEAD_MAX, CHUNK, ReplayError, ReplayProgress, TICK, worker};
+use crate::evidence::KnownWalls;
 use crate::log::Log;
-use crate::robot::{Passed, SonarVerdicts, Surveyor};
+use crate::robot::{MappedWalls, Passed, SonarVerdicts, Surveyor};
 use crate::sync::{Outbox, OutboxConfig, OutboxContents, Pushed};
 
 /// What became of the readings.
@@ -57,6 +58,7 @@ pub(super) struct Producer {
     log: Arc<Log>,
     numbers: Arc<[u32]>,
     surveyor: Option<Surveyor>,
+    walls: Option<Arc<MappedWalls>>,
     frame: Uuid,
     outbox: Arc<Outbox>,
     surveyed: Surveyed,
@@ -68,6 +70,7 @@ impl Producer {
         log: Log,
         numbers: Vec<u32>,
         surveyor: Surveyor,
+        walls: Option<MappedWalls>,
         frame: Uuid,
         outbox: Arc<Outbox>,
     ) -> Self {
@@ -75,6 +78,7 @@ impl Producer {
             log: Arc::new(log),
             numbers: numbers.into(),
             surveyor: Some(surveyor),
+            walls: walls.map(Arc::new),
             frame,
             outbox,
             surveyed: Surveyed::default(),
@@ -132,6 +136,7 @@ impl Producer {
         let (log, numbers) = (Arc::clone(&self.log), Arc::clone(&self.numbers));
         let (outbox, frame) = (Arc::clone(&self.outbox), self.frame);
         let mut surveyed = std::mem::take(&mut self.surveyed);
+        let walls = self.walls.clone();
         let (surveyor, surveyed) = worker(move || {
             let mut made: Vec<v1::Contribution> = Vec::with_capacity(stretch.len());
             for number in &numbers[stretch] {
@@ -149,7 +154,8 @@ impl Producer {
                 if outbox.acknowledgement(frame, id).is_some() {
                     surveyed.known += 1;
                 } else {
-                    let look = surveyor.observe(reading, pose);
+                    let walls = walls.as_deref().map(|walls| walls as &dyn KnownWalls);
+                    let look = surveyor.observe_among(reading, pose, walls);
                     surveyed.sonar.add(&look.sonar);
                     made.push(look.to_wire(frame));
                 }
