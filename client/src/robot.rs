@@ -21,10 +21,10 @@ pub use look::Look;
 pub use mapped_walls::MappedWalls;
 pub use odometry::{DeadReckoning, OdometryNoise};
 
-pub use crate::evidence::SonarVerdicts;
+pub use crate::evidence::{KnownWalls, SonarVerdicts};
 
 use crate::emulation::EmulationConfig;
-use crate::evidence::{Canvas, KnownWalls, ScannerEvidenceConfig, SonarEvidenceConfig};
+use crate::evidence::{Canvas, ScannerEvidenceConfig, SonarEvidenceConfig};
 use crate::log::{Observation, Reading};
 use crate::perception::Extractor;
 use crate::sensor::{ScannerProfile, Sensors, SonarProfile};

@@ -9,9 +9,8 @@ use tokio::time::{Instant, sleep_until};
 use uuid::Uuid;
 
 use super::{AHEAD_MAX, CHUNK, ReplayError, ReplayProgress, TICK, worker};
-use crate::evidence::KnownWalls;
 use crate::log::Log;
-use crate::robot::{MappedWalls, Passed, SonarVerdicts, Surveyor};
+use crate::robot::{KnownWalls, MappedWalls, Passed, SonarVerdicts, Surveyor};
 use crate::sync::{Outbox, OutboxConfig, OutboxContents, Pushed};
 
 /// What became of the readings.
