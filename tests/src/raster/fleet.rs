@@ -2,6 +2,7 @@
 //! own, and the layers of their evidence read together.
 
 use mapfold_client::evidence::{Canvas, SonarEvidenceConfig, sonar_evidence};
+use mapfold_map::raster::{LogOdds, Said, together};
 
 use super::rooms::{claimed, hear, sonar_profile};
 use super::sonar::scanned;
@@ -83,6 +84,17 @@ impl Layers {
         }
         let truth = Truth::of(&blank, &world.walls, world.way[0]);
         Self { scanner, sonar, scanner_looks, truth }
+    }
+
+    /// Both layers as Mapfold reads them together.
+    pub fn together(&self) -> Grid {
+        let mut read = self.scanner.clone();
+        for (scanner, sonar) in read.nats.iter_mut().zip(&self.sonar.nats) {
+            let of = LogOdds::from_nat;
+            let said = Said { scanner: of(*scanner), sonar: of(*sonar), ..Said::default() };
+            *scanner = together(said).map_or(0.0, LogOdds::nat);
+        }
+        read
     }
 
     /// Both layers in one, sonar counting `weight` where the scanner overrides it.

@@ -113,6 +113,7 @@ pub fn layer_rows(seeds: u64) -> (Vec<Vec<String>>, Vec<String>) {
         let fused = |over, weight| mean(&|l| l.truth.scores(&l.fused(over, weight)));
         let alone = [mean(&|l| l.truth.scores(&l.scanner)), mean(&|l| l.truth.scores(&l.sonar))];
         let sum = fused(Override::Never, 1.0);
+        let together = mean(&|l| l.truth.scores(&l.together()));
         for (what, scores) in [
             ("base rate", mean(&|l| l.truth.base_scores())),
             ("scanner alone", alone[0]),
@@ -120,14 +121,17 @@ pub fn layer_rows(seeds: u64) -> (Vec<Vec<String>>, Vec<String>) {
             ("sum of both", sum),
             ("sonar by 0.3 after 3 looks of the scanner", fused(Override::Looks(3), 0.3)),
             ("sonar by 0.5 where the scanner looked", fused(Override::Looks(0), 0.5)),
-            ("sonar by 0.3 where the scanner looked", fused(Override::Looks(0), 0.3)),
+            ("Mapfold: sonar by 0.3 where the scanner looked", together),
             ("sonar by 0.3 from 1.2 nat of the scanner", fused(Override::Evidence(1.2), 0.3)),
             ("no sonar from 1.2 nat of the scanner", fused(Override::Evidence(1.2), 0.0)),
         ] {
             rows.push(row(&[name, what], &scores));
         }
-        if alone.iter().any(|layer| layer.log_bits <= sum.log_bits) {
-            faults.push(format!("sonar drives {name}: the sum is no better than a layer alone"));
+        if alone.iter().any(|layer| layer.log_bits <= together.log_bits) {
+            faults.push(format!("sonar drives {name}: both are no better than a layer alone"));
+        }
+        if sum.log_bits < together.log_bits {
+            faults.push(format!("sonar drives {name}: the plain sum tells more"));
         }
     }
     (rows, faults)
