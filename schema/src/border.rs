@@ -3,6 +3,7 @@
 mod chains;
 mod contribution;
 mod features;
+pub mod gdb;
 mod number;
 mod sensors;
 mod violations;

@@ -262,7 +262,9 @@ fn shape(path: &serde_path_to_error::Path, error: &impl ToString) -> DecodeError
             Segment::Seq { index } => index.to_string(),
             // A key may be anything that the body holds.
             Segment::Map { key } => key.replace('~', "~0").replace('/', "~1"),
-            Segment::Enum { .. } | Segment::Unknown => continue,
+            // A variant that holds something is the key of an object.
+            Segment::Enum { variant } => variant.clone(),
+            Segment::Unknown => continue,
         };
         pointer.push('/');
         pointer.push_str(&step);

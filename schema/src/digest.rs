@@ -14,9 +14,14 @@ use crate::v1;
 /// A contribution that CBOR cannot hold (none that was decoded).
 pub fn content_digest(contribution: &v1::Contribution) -> Result<String, EncodeError> {
     let digest = Sha256::digest(codec::to_cbor(contribution)?);
-    let mut hex = String::with_capacity(2 * digest.len());
-    for byte in digest {
+    Ok(hexadecimal(&digest))
+}
+
+/// Bytes in lower-case hexadecimal.
+pub fn hexadecimal(bytes: &[u8]) -> String {
+    let mut hex = String::with_capacity(2 * bytes.len());
+    for byte in bytes {
         let _ = write!(hex, "{byte:02x}"); // writing to a String cannot fail
     }
-    Ok(hex)
+    hex
 }

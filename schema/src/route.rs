@@ -36,6 +36,22 @@ pub const PATCHES: &str = "/api/v1/sites/{site}/levels/{level}/patches";
 pub const EVENTS: &str = "/api/v1/sites/{site}/levels/{level}/events";
 /// `GET, POST, DELETE`: maps of other programs as the level's prior.
 pub const IMPORTS: &str = "/api/v1/sites/{site}/levels/{level}/imports";
+/// `GET, PUT, PATCH`: the a-priori model (GDB), as a draft or as published.
+pub const GDB: &str = "/api/v1/sites/{site}/levels/{level}/gdb";
+/// `POST`: publish the draft of the GDB.
+pub const GDB_PUBLICATIONS: &str = "/api/v1/sites/{site}/levels/{level}/gdb/publications";
+/// `GET`: who changed the GDB, and when.
+pub const GDB_ENTRIES: &str = "/api/v1/sites/{site}/levels/{level}/gdb/entries";
+/// `GET`: what is wrong with the GDB.
+pub const GDB_FINDINGS: &str = "/api/v1/sites/{site}/levels/{level}/gdb/findings";
+/// `GET`: the GDB cut at a height.
+pub const GDB_PLAN: &str = "/api/v1/sites/{site}/levels/{level}/gdb/plan";
+/// `POST`: make what is published the prior of the raster.
+pub const GDB_PRIOR: &str = "/api/v1/sites/{site}/levels/{level}/gdb/prior";
+/// `GET`: the landmarks that robots find themselves by.
+pub const LANDMARKS: &str = "/api/v1/sites/{site}/levels/{level}/landmarks";
+/// `GET, PUT`: the library of a site.
+pub const PROTOTYPES: &str = "/api/v1/sites/{site}/prototypes";
 /// `GET`: exports.
 pub const EXPORTS: &str = "/api/v1/sites/{site}/levels/{level}/exports/{format}";
 /// `POST`, `GET`, `DELETE`: the page's session.

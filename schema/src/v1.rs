@@ -3,9 +3,13 @@
 mod contribution;
 mod event;
 mod features;
+mod gdb;
+mod gdb_log;
 mod import;
+mod jsonfg;
 mod level;
 mod patch;
+mod plan;
 mod receipt;
 mod revert;
 mod robot;
@@ -23,9 +27,25 @@ pub use event::LevelEvent;
 pub use features::{
     Chain, ChainKind, Cluster, EndKind, Facing, Segment, SensorClass, SolidInterval,
 };
+pub use gdb::{
+    Door, DoorKind, GdbBox, GdbCylinder, GdbObject, GdbPlacement, GdbPolyhedron, GdbPrism,
+    GdbPrototype, GdbSolid, ObjectKind,
+};
+pub use gdb_log::{
+    FindingSeverity, GdbAnswer, GdbEdit, GdbEntry, GdbEntryKind, GdbEntryPage, GdbFinding,
+    GdbFindings, GdbPreview,
+};
 pub use import::{Import, ImportPage, ImportReport};
+pub use jsonfg::{
+    CollectionWord, FeatureWord, GdbCollection, GdbFeature, Geometry, PrototypeCollection,
+    PrototypeFeature,
+};
 pub use level::{Bounds, Counts, LevelDescription, NewLevel};
 pub use patch::{Patch, RasterChanges, Removed, TileAddress, TileEvidence, TilePlace, VectorPatch};
+pub use plan::{
+    GdbPlan, Landmark, LandmarkKind, LandmarkSource, LandmarkTable, PlanCorner, PlanObject,
+    PlanOpening, PlanOpeningSide,
+};
 pub use receipt::{Receipt, UploadAnswer};
 pub use revert::{
     ChangeCounts, ChangeKind, ChangedFeature, FeatureKind, NewRevert, Revert, RevertPage,

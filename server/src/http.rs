@@ -5,7 +5,7 @@
 //! * `layers`: what every request passes before and after its handler, in an order that matters.
 //! * `listen`: the accept loop.
 //! * `problem`: every error and the problem that it becomes.
-//! * `access`, `body`, `cap`, `query`, `answer`: what handlers take in and give out.
+//! * `access`, `body`, `cap`, `query`, `preconditions`, `answer`: what handlers take in and give out.
 //! * One file per resource, with thin handlers.
 
 mod access;
@@ -18,6 +18,7 @@ mod layers;
 mod listen;
 mod observe;
 mod openapi;
+mod preconditions;
 mod problem;
 mod query;
 mod router;
@@ -30,11 +31,15 @@ mod events;
 mod exports;
 #[cfg(test)]
 mod fixture;
+mod gdb;
 mod health;
 mod imports;
+mod landmarks;
 mod levels;
 mod page;
 mod patches;
+mod plan;
+mod prototypes;
 mod raster;
 mod reverts;
 mod robots;

@@ -2,14 +2,16 @@
 //!
 //! A contribution is *accepted* (checked and encoded, by the caller), *appended* to the log
 //! together with whatever else is waiting, acknowledged, *folded*, *published* as a new
-//! [`Snapshot`] and *written behind*. Acts (reverts and their undoing) and imports go into the same log and
-//! are folded like contributions. Memory is a cache of the store, never the reverse: whatever
+//! [`Snapshot`] and *written behind*. Acts (reverts and their undoing), imports and edits of
+//! the GDB go into the same log and are folded like contributions. Memory is a cache of the store, never the reverse: whatever
 //! fails here, the level is dropped and read back. Knows the store and the map, not HTTP.
 
 mod accept;
 mod append;
 mod fold;
 pub(crate) mod folding;
+pub mod gdb;
+mod gdb_prior;
 mod history;
 mod open;
 pub(crate) mod prior;
@@ -42,6 +44,7 @@ pub use snapshot::Snapshot;
 use crate::store::Store;
 use crate::store::levels::LevelRow;
 use append::Waiting;
+use gdb::ModelCache;
 use registry::DiskAlarm;
 use trial::Trial;
 
@@ -102,6 +105,8 @@ struct Shared {
     look: Arc<Notify>,
     /// Acts to be tried out by the fold.
     trials: mpsc::Sender<Trial>,
+    /// Models of the GDB that were read.
+    models: ModelCache,
     store: Store,
     alarm: DiskAlarm,
 }

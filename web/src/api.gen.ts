@@ -163,6 +163,138 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/sites/{site}/levels/{level}/gdb": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * The a-priori model of the level as JSON-FG, in its frame: objects by identity.
+         * @description The `ETag` is the version of the model; send it as `If-Match` with the next edit.
+         */
+        get: operations["read_gdb"];
+        /**
+         * Makes the draft what is sent: objects that are not in it are no more. Needs `map:edit` and `If-Match`.
+         * @description What changes is one entry of the level's log. What is so already changes nothing, whatever `If-Match`
+         *     says, so that a lost answer may be asked for again. `place` may be left out; without `solids` and
+         *     `prototype` it says what an object is made of.
+         */
+        put: operations["replace_gdb"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        /**
+         * Puts some objects of the draft in the place of what they were, and removes others. Needs `map:edit`
+         *     and `If-Match`. As for `PUT`.
+         */
+        patch: operations["edit_gdb"];
+        trace?: never;
+    };
+    "/api/v1/sites/{site}/levels/{level}/gdb/entries": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** Who changed and published the model, newest first, in pages. */
+        get: operations["list_gdb_entries"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/sites/{site}/levels/{level}/gdb/findings": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * What is wrong with the model, each with its place and what to do: faults of solids, of objects, and
+         *     between objects.
+         */
+        get: operations["read_gdb_findings"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/sites/{site}/levels/{level}/gdb/plan": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * What a sensor at one height would see of the model: outlines of what is solid, sheets, and doorways
+         *     with their jambs, each edge with the object that it belongs to.
+         * @description The cut is the one just above the height; touching solids are one, and doorways take out what walls
+         *     have inside them. The same objects give the same bits.
+         */
+        get: operations["read_gdb_plan"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/sites/{site}/levels/{level}/gdb/prior": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Makes what is published, cut at a height, the prior of the raster: an import like any other (see
+         *     `imports`), in the place of the one before. Needs `map:edit`.
+         * @description Cells with a surface in them say +4.0 nat times the trust of its object, those inside of something
+         *     +2.0, free ones in rooms -0.5 nat.
+         */
+        post: operations["make_gdb_prior"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/sites/{site}/levels/{level}/gdb/publications": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Publishes the draft: robots get its plans and landmarks from then on. Needs `map:publish` and `If-Match`.
+         * @description A draft with errors (see `findings`) is not published. What is published stays as it is, also when
+         *     prototypes change: that takes another publication.
+         */
+        post: operations["publish_gdb"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/sites/{site}/levels/{level}/imports": {
         parameters: {
             query?: never;
@@ -194,6 +326,26 @@ export interface paths {
          *     its own. Needs `map:edit`.
          */
         delete: operations["remove_import"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/sites/{site}/levels/{level}/landmarks": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * The landmarks of the published model at a sensor's height: corners, free ends and doorways, each with
+         *     its direction and covariance; or what changed of them.
+         */
+        get: operations["read_landmarks"];
+        put?: never;
+        post?: never;
+        delete?: never;
         options?: never;
         head?: never;
         patch?: never;
@@ -376,6 +528,28 @@ export interface paths {
          */
         get: operations["read_vector"];
         put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/sites/{site}/prototypes": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The prototypes of a site as JSON-FG, by name. The `ETag` is for `If-Match` of the next change. */
+        get: operations["read_prototypes"];
+        /**
+         * Makes the library what is sent: prototypes that are not in it are no more. Needs `map:edit` and
+         *     `If-Match`. Drafts take their instances from the library as it is; what is published keeps that
+         *     with which it was published.
+         */
+        put: operations["replace_prototypes"];
         post?: never;
         delete?: never;
         options?: never;
@@ -610,6 +784,11 @@ export interface components {
             /** @description Who saw it. */
             robots: string[];
         };
+        /**
+         * @description `FeatureCollection`.
+         * @enum {string}
+         */
+        CollectionWord: "FeatureCollection";
         /** @description All that one robot saw under one fix. Immutable; the id is the idempotency key. */
         Contribution: {
             /** @description What no line explains, in the robot frame. */
@@ -740,6 +919,21 @@ export interface components {
              */
             tiles: number;
         };
+        /** @description How a doorway is closed: kept and shown; plans take doorways as open. */
+        Door: {
+            /**
+             * Format: double
+             * @description How far leaves that turn open.
+             */
+            opens_rad?: number | null;
+            /** @description What closes it. */
+            type: components["schemas"]["DoorKind"];
+        };
+        /**
+         * @description What closes a doorway.
+         * @enum {string}
+         */
+        DoorKind: "open" | "hinged" | "double_hinged" | "sliding" | "double_sliding" | "telescope" | "double_telescope";
         /**
          * @description What an end of a segment is.
          * @enum {string}
@@ -762,6 +956,384 @@ export interface components {
          * @enum {string}
          */
         FeatureKind: "segment" | "cluster" | "chain";
+        /**
+         * @description `Feature`.
+         * @enum {string}
+         */
+        FeatureWord: "Feature";
+        /**
+         * @description How bad a finding is.
+         * @enum {string}
+         */
+        FindingSeverity: "warning" | "error";
+        /** @description The answer to an edit or a publication. */
+        GdbAnswer: {
+            /**
+             * Format: int64
+             * @description The draft as it is now.
+             */
+            draft: number;
+            entry?: components["schemas"]["GdbEntry"] | null;
+            /**
+             * Format: int64
+             * @description The revision of the site's library.
+             */
+            library: number;
+        };
+        /** @description A box along the object's axes. */
+        GdbBox: {
+            /** @description The smaller coordinates. */
+            from_m: number[];
+            /** @description The greater coordinates. */
+            to_m: number[];
+        };
+        /** @description The a-priori model of a level. */
+        GdbCollection: {
+            /** @description Which parts of JSON-FG are used. */
+            conformsTo?: string[];
+            /** @description The level's frame, metres; may be left out of what is sent, and is refused if it is another frame. */
+            coordRefSys?: Record<string, never> | null;
+            /** @description The objects, by identity. */
+            features: components["schemas"]["GdbFeature"][];
+            /**
+             * Format: int64
+             * @description In answers: the revision of the site's library that instances are taken from.
+             */
+            library?: number | null;
+            /**
+             * Format: int64
+             * @description In answers: the revision of the level's log at which the model became what this is.
+             */
+            revision?: number | null;
+            /** @description `FeatureCollection`. */
+            type: components["schemas"]["CollectionWord"];
+        };
+        /**
+         * @description An upright cylinder, taken as the inscribed prism with the fewest sides that keeps within
+         *     the chord error.
+         */
+        GdbCylinder: {
+            /** @description The axis. */
+            centre_m: number[];
+            /**
+             * Format: double
+             * @description How far its sides may lie inside of it; 0.005 if absent.
+             */
+            chord_error_m?: number | null;
+            /**
+             * Format: double
+             * @description Height of the lower face.
+             */
+            lower_m: number;
+            /**
+             * Format: double
+             * @description Radius.
+             */
+            radius_m: number;
+            /**
+             * Format: double
+             * @description Height of the upper face.
+             */
+            upper_m: number;
+        };
+        /** @description `PATCH L/gdb`: some objects put in the place of what they were, others taken away. */
+        GdbEdit: {
+            /** @description New objects, and those that change, whole. */
+            put?: components["schemas"]["GdbFeature"][];
+            /** @description Objects that are no more. One that is not there is none. */
+            remove?: string[];
+        };
+        /** @description An entry of a level's log about its GDB. */
+        GdbEntry: {
+            /** @description When the server took it. */
+            at: string;
+            /** @description Public id of the token that asked for it. */
+            author: string;
+            /** @description What for, in the author's words. */
+            comment: string;
+            /**
+             * Format: int64
+             * @description The draft: after an edit the edit itself, of a publication the edit that is published. 0: the
+             *     empty model.
+             */
+            draft: number;
+            /**
+             * Format: uuid
+             * @description Its identity.
+             */
+            id: string;
+            /** @description What it does. */
+            kind: components["schemas"]["GdbEntryKind"];
+            /**
+             * Format: int64
+             * @description The revision of the site's library at that moment. A publication keeps it.
+             */
+            library: number;
+            /**
+             * Format: int32
+             * @description Objects that it put.
+             */
+            put: number;
+            /**
+             * Format: int32
+             * @description Objects that it removed.
+             */
+            removed: number;
+            /**
+             * Format: int64
+             * @description Its place in the level's log.
+             */
+            revision: number;
+        };
+        /**
+         * @description Kinds of entries about the GDB.
+         * @enum {string}
+         */
+        GdbEntryKind: "edit" | "publication";
+        /** @description A page of the entries about the GDB. */
+        GdbEntryPage: {
+            /** @description The entries, newest first. */
+            entries: components["schemas"]["GdbEntry"][];
+            /** @description `cursor` of the next page; absent on the last one. */
+            next?: string | null;
+        };
+        /** @description An object as a feature. */
+        GdbFeature: {
+            /** @description The object's kind again, for programs that tell features by it. */
+            featureType?: string | null;
+            geometry?: components["schemas"]["Geometry"] | null;
+            /**
+             * Format: uuid
+             * @description The object, made by whoever draws it.
+             */
+            id: string;
+            place?: components["schemas"]["Geometry"] | null;
+            /** @description The object. */
+            properties: components["schemas"]["GdbObject"];
+            /** @description Null: the model is of no time. */
+            time?: Record<string, never> | null;
+            /** @description `Feature`. */
+            type: components["schemas"]["FeatureWord"];
+        };
+        /** @description Something wrong with a model. */
+        GdbFinding: {
+            /** @description Where: in the level for what is between objects, else in the coordinates of the object or prototype. */
+            at_m?: number[] | null;
+            /** @description Stable name of the fault. */
+            code: string;
+            /** @description What is wrong and what to do. */
+            detail: string;
+            /**
+             * Format: int32
+             * @description In which face of the polyhedron, from 0.
+             */
+            face?: number | null;
+            /**
+             * Format: uuid
+             * @description In which object.
+             */
+            object?: string | null;
+            /**
+             * Format: uuid
+             * @description The other object, if it is between two.
+             */
+            other?: string | null;
+            /** @description In which prototype. */
+            prototype?: string | null;
+            /** @description How bad it is. */
+            severity: components["schemas"]["FindingSeverity"];
+            /**
+             * Format: int32
+             * @description In which of its solids, from 0.
+             */
+            solid?: number | null;
+        };
+        /** @description `GET L/gdb/findings`. */
+        GdbFindings: {
+            /**
+             * Format: int64
+             * @description The draft that they are about.
+             */
+            draft: number;
+            /** @description The findings: those in prototypes, in objects, between objects. */
+            findings: components["schemas"]["GdbFinding"][];
+            /**
+             * Format: int64
+             * @description The library that instances are taken from.
+             */
+            library: number;
+        };
+        /** @description Something that stands in the level: solids of its own, or an instance of a prototype. */
+        GdbObject: {
+            door?: components["schemas"]["Door"] | null;
+            /** @description What it is. */
+            kind: components["schemas"]["ObjectKind"];
+            /** @description What people call it; may be empty. */
+            name?: string;
+            placement?: components["schemas"]["GdbPlacement"] | null;
+            /** @description The prototype that it is an instance of, instead of `solids`. */
+            prototype?: string | null;
+            /** @description Solids of its own, in its own coordinates; several make a compound object. */
+            solids?: components["schemas"]["GdbSolid"][] | null;
+            /**
+             * Format: double
+             * @description Standard deviation of where it stands; 0.03 if absent.
+             */
+            tolerance_m?: number | null;
+            /**
+             * Format: double
+             * @description How far it is to be believed that it is there, 0 to 1; 0.5 if absent.
+             */
+            trust?: number | null;
+        };
+        /** @description Where an object stands in the level. */
+        GdbPlacement: {
+            /** @description The origin of the object's own coordinates, in the level; z is the height above its floor. */
+            position_m: number[];
+            /**
+             * @description How it is turned: a unit quaternion, `[w, x, y, z]`; not turned if absent. Upright by the
+             *     angle `a`: `[cos(a/2), 0, 0, sin(a/2)]`.
+             */
+            rotation?: number[] | null;
+        };
+        /** @description `GET L/gdb/plan`: the GDB cut just above one height. */
+        GdbPlan: {
+            /**
+             * Format: int64
+             * @description The draft that is shown.
+             */
+            draft: number;
+            /**
+             * Format: double
+             * @description The height above the level's floor.
+             */
+            height_m: number;
+            /**
+             * Format: int64
+             * @description The library that instances are taken from.
+             */
+            library: number;
+            /** @description The objects that edges belong to, by identity. */
+            objects: components["schemas"]["PlanObject"][];
+            /** @description Doorways. */
+            openings: components["schemas"]["PlanOpening"][];
+            /**
+             * @description Closed outlines of what is solid, free space on their left: clockwise about something that stands in a
+             *     room, counter-clockwise within a room.
+             */
+            outlines: components["schemas"]["PlanCorner"][][];
+            /** @description Surfaces without thickness, seen from both sides. */
+            sheets: components["schemas"]["PlanCorner"][][];
+        };
+        /** @description Any faces: closed they enclose something, open they are sheets. */
+        GdbPolyhedron: {
+            /**
+             * @description The faces: each a list of rings of indices into the vertices. The outer ring comes first, and
+             *     runs counter-clockwise seen from outside.
+             */
+            faces: number[][][];
+            /** @description The vertices. */
+            vertices_m: number[][];
+        };
+        /** @description What an edit would change. */
+        GdbPreview: {
+            /**
+             * Format: int32
+             * @description Objects that would be another.
+             */
+            changed: number;
+            /**
+             * Format: int64
+             * @description The draft that it would change.
+             */
+            draft: number;
+            /** @description What would be wrong with the model, at most 200 findings. */
+            findings: components["schemas"]["GdbFinding"][];
+            /** @description Whether there are more of them. */
+            more_findings: boolean;
+            /**
+             * Format: int32
+             * @description Objects that the model does not have now.
+             */
+            new: number;
+            /**
+             * Format: int32
+             * @description Objects that would be no more.
+             */
+            removed: number;
+        };
+        /** @description A polygon drawn up from one height to another. */
+        GdbPrism: {
+            /** @description The rings of the polygon, the outer one first, then its holes; the first corner is not repeated. */
+            base_m: number[][][];
+            /**
+             * Format: double
+             * @description Height of the lower face.
+             */
+            lower_m: number;
+            /**
+             * Format: double
+             * @description Height of the upper face.
+             */
+            upper_m: number;
+        };
+        /** @description A generic object of a site's library. */
+        GdbPrototype: {
+            kind?: components["schemas"]["ObjectKind"] | null;
+            /** @description What instances are made of, in their own coordinates. */
+            solids: components["schemas"]["GdbSolid"][];
+        };
+        /** @description A primitive solid in the coordinates of its object. */
+        GdbSolid: {
+            /** @description A box along the object's axes. */
+            box: components["schemas"]["GdbBox"];
+        } | {
+            /** @description A polygon drawn up. */
+            prism: components["schemas"]["GdbPrism"];
+        } | {
+            /** @description An upright cylinder. */
+            cylinder: components["schemas"]["GdbCylinder"];
+        } | {
+            /** @description Any faces. */
+            polyhedron: components["schemas"]["GdbPolyhedron"];
+        };
+        /** @description A geometry of GeoJSON with heights, or of JSON-FG. */
+        Geometry: {
+            /** @description The outer ring, then holes. */
+            coordinates: number[][][];
+            /** @enum {string} */
+            type: "Polygon";
+        } | {
+            /** @description The polygons. */
+            coordinates: number[][][][];
+            /** @enum {string} */
+            type: "MultiPolygon";
+        } | {
+            /** @description Shells, the outer one first; each of polygons. */
+            coordinates: number[][][][][];
+            /** @enum {string} */
+            type: "Polyhedron";
+        } | {
+            /** @description A polygon in the plane. */
+            base: components["schemas"]["Geometry"];
+            /**
+             * Format: double
+             * @description Height of the lower face.
+             */
+            lower: number;
+            /** @enum {string} */
+            type: "Prism";
+            /**
+             * Format: double
+             * @description Height of the upper face.
+             */
+            upper: number;
+        } | {
+            /** @description They. */
+            geometries: components["schemas"]["Geometry"][];
+            /** @enum {string} */
+            type: "GeometryCollection";
+        };
         /** @description An import as the log has it. */
         Import: {
             /** @description When the server took it. */
@@ -869,6 +1441,64 @@ export interface components {
             scopes: components["schemas"]["Scope"][];
             /** @description What goes into `Authorization: Bearer`. */
             token: string;
+        };
+        /** @description A landmark: what robots find themselves by. */
+        Landmark: {
+            /** @description Where it is. */
+            at_m: number[];
+            /** @description Covariance of x, y and heading. */
+            covariance: number[][];
+            /**
+             * Format: double
+             * @description The angle of free space at a corner, radians; the width of a doorway or an end, metres.
+             */
+            extent: number;
+            /**
+             * Format: double
+             * @description Into free space: the bisector of a corner, outward from an end; of a doorway the normal of its wall, in
+             *     (-pi/2, pi/2].
+             */
+            heading_rad: number;
+            /** @description Its identity: kind, objects and place. */
+            id: string;
+            /** @description What it is. */
+            kind: components["schemas"]["LandmarkKind"];
+            /** @description The objects that make it, or the segments' ids. */
+            objects: string[];
+            /** @description Where it is known from. */
+            source: components["schemas"]["LandmarkSource"];
+        };
+        /**
+         * @description Kinds of landmarks.
+         * @enum {string}
+         */
+        LandmarkKind: "convex_corner" | "concave_corner" | "wall_end" | "doorway";
+        /**
+         * @description Where a landmark is known from.
+         * @enum {string}
+         */
+        LandmarkSource: "gdb" | "learned";
+        /** @description `GET L/landmarks`: those that changed, or all of them. */
+        LandmarkTable: {
+            /**
+             * Format: double
+             * @description The height that they are seen at.
+             */
+            height_m: number;
+            /** @description New landmarks, and those that are another than they were. */
+            landmarks: components["schemas"]["Landmark"][];
+            /**
+             * Format: int64
+             * @description The publication of the GDB that they are of; 0 if there is none.
+             */
+            publication: number;
+            /** @description Landmarks that are no more, or no longer where they are asked for. */
+            removed: string[];
+            /**
+             * Format: int64
+             * @description The revision of the level for which this holds: the `since` of the next question.
+             */
+            revision: number;
         };
         /** @description Where a robot last was. */
         LastPose: {
@@ -1040,6 +1670,11 @@ export interface components {
             /** @description What it allows; `map:read` and `map:contribute` if absent. */
             scopes?: components["schemas"]["Scope"][] | null;
         };
+        /**
+         * @description What an object is. Only walls and doorways are treated in a way of their own.
+         * @enum {string}
+         */
+        ObjectKind: "wall" | "doorway" | "corridor" | "machine" | "furniture" | "other";
         /** @description Points that no line explains, in the robot frame. */
         ObservedCluster: {
             /** @description Mean of the points. */
@@ -1129,6 +1764,63 @@ export interface components {
             /** @description New or changed tiles, whole. */
             tiles: components["schemas"]["TileEvidence"][];
         };
+        /** @description An edge of an outline or a sheet: from its corner to the next one. */
+        PlanCorner: {
+            /** @description Where it is. */
+            at_m: number[];
+            /**
+             * Format: int32
+             * @description Whose surface begins there: an index into `objects`. The last corner of a sheet repeats the one before.
+             */
+            object: number;
+        };
+        /** @description An object that a plan shows something of. */
+        PlanObject: {
+            /**
+             * Format: uuid
+             * @description Which one.
+             */
+            id: string;
+            /** @description What it is. */
+            kind: components["schemas"]["ObjectKind"];
+            /**
+             * Format: double
+             * @description Standard deviation of where it stands.
+             */
+            tolerance_m: number;
+            /**
+             * Format: double
+             * @description How far it is to be believed that it is there.
+             */
+            trust: number;
+        };
+        /** @description A doorway that leads through something at this height. */
+        PlanOpening: {
+            /**
+             * Format: uuid
+             * @description The doorway.
+             */
+            doorway: string;
+            /** @description The stretches of walls that it opens; two for a doorway through one straight wall. */
+            sides: components["schemas"]["PlanOpeningSide"][];
+            /**
+             * Format: double
+             * @description Its width.
+             */
+            width_m: number;
+        };
+        /** @description Where a doorway opens one face of a wall. */
+        PlanOpeningSide: {
+            /** @description One jamb; seen from there to the other one, the wall is on the right. */
+            from_m: number[];
+            /** @description The other jamb. */
+            to_m: number[];
+            /**
+             * Format: uuid
+             * @description The wall.
+             */
+            wall: string;
+        };
         /** @description `level_from_robot` with its covariance. */
         PoseEstimate: {
             /** @description Covariance of (x, y, heading), row by row. */
@@ -1172,6 +1864,33 @@ export interface components {
             title: string;
             /** @description Stable URI of the kind of problem: `urn:mapfold:problem:<code>`. */
             type: string;
+        };
+        /** @description The library of a site. */
+        PrototypeCollection: {
+            /** @description Which parts of JSON-FG are used. */
+            conformsTo?: string[];
+            /** @description The prototypes, by name. */
+            features: components["schemas"]["PrototypeFeature"][];
+            /**
+             * Format: int64
+             * @description In answers: how often the library has changed.
+             */
+            revision?: number | null;
+            /** @description `FeatureCollection`. */
+            type: components["schemas"]["CollectionWord"];
+        };
+        /** @description A prototype as a feature: `id` is its name. */
+        PrototypeFeature: {
+            /** @description `prototype`. */
+            featureType?: string | null;
+            geometry?: components["schemas"]["Geometry"] | null;
+            /** @description Its name: what instances name it by. */
+            id: string;
+            place?: components["schemas"]["Geometry"] | null;
+            /** @description The prototype. */
+            properties: components["schemas"]["GdbPrototype"];
+            /** @description `Feature`. */
+            type: components["schemas"]["FeatureWord"];
         };
         /**
          * @description Where a pose comes from.
@@ -2317,6 +3036,462 @@ export interface operations {
             };
         };
     };
+    read_gdb: {
+        parameters: {
+            query?: {
+                /** @description `draft` (if absent) or `published`. */
+                state?: "draft" | "published";
+                /** @description `false`: without `place`, for those who read the properties. */
+                place?: boolean;
+            };
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The model */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/geo+json": components["schemas"]["GdbCollection"];
+                    "application/json": components["schemas"]["GdbCollection"];
+                };
+            };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    replace_gdb: {
+        parameters: {
+            query?: {
+                /** @description `true`: tell what would change and what would be wrong, and change nothing. */
+                preview?: boolean;
+                /** @description What for, for those who read the log; at most 500 bytes. */
+                comment?: string;
+            };
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/geo+json": components["schemas"]["GdbCollection"];
+                "application/json": components["schemas"]["GdbCollection"];
+            };
+        };
+        responses: {
+            /** @description The draft is so */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["GdbPreview"];
+                };
+            };
+            /** @description `gdb_moved_on`: others have changed it since; `errors` says what */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description `body_invalid` with `errors`; `gdb_too_large` */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description `precondition_required`: send `If-Match` */
+            428: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    edit_gdb: {
+        parameters: {
+            query?: {
+                /** @description `true`: tell what would change and what would be wrong, and change nothing. */
+                preview?: boolean;
+                /** @description What for, for those who read the log; at most 500 bytes. */
+                comment?: string;
+            };
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["GdbEdit"];
+            };
+        };
+        responses: {
+            /** @description The draft is so */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["GdbPreview"];
+                };
+            };
+            /** @description `gdb_moved_on`: others have changed it since; `errors` says what */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description `body_invalid` with `errors`; `gdb_too_large` */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description `precondition_required`: send `If-Match` */
+            428: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    list_gdb_entries: {
+        parameters: {
+            query?: {
+                /** @description `next` of the page before. */
+                cursor?: string;
+                /** @description Entries of a page, at most 500; 50 if absent. */
+                limit?: number;
+            };
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description A page of entries */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["GdbEntryPage"];
+                };
+            };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_gdb_findings: {
+        parameters: {
+            query?: {
+                /** @description `draft` (if absent) or `published`. */
+                state?: "draft" | "published";
+            };
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The findings */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["GdbFindings"];
+                };
+            };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_gdb_plan: {
+        parameters: {
+            query?: {
+                /** @description Height above the level's floor: that of the sensor; 0.3 if absent. */
+                height_m?: number;
+                /** @description `draft` (if absent) or `published`. */
+                state?: "draft" | "published";
+            };
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The plan */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["GdbPlan"];
+                };
+            };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description `plan_too_crowded`: too much stands in the same place */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    make_gdb_prior: {
+        parameters: {
+            query?: {
+                /** @description Height above the level's floor: that of the sensors; 0.3 if absent. */
+                height_m?: number;
+                /** @description `true`: tell what it would be, and change nothing. */
+                preview?: boolean;
+            };
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description What it would be, for a preview */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ImportReport"];
+                };
+            };
+            /** @description It is the prior */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Import"];
+                };
+            };
+            /** @description `publication_not_found`: nothing is published yet */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description `plan_too_crowded`; `prior_too_large` */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    publish_gdb: {
+        parameters: {
+            query?: {
+                /** @description What for, for those who read the log; at most 500 bytes. */
+                comment?: string;
+            };
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description It is published already */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["GdbAnswer"];
+                };
+            };
+            /** @description It is published */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["GdbAnswer"];
+                };
+            };
+            /** @description `gdb_has_errors`: `errors` names the first */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description `gdb_moved_on`: others have changed it since; `errors` says what */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description `precondition_required`: send `If-Match` */
+            428: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     list_imports: {
         parameters: {
             query?: {
@@ -2455,6 +3630,66 @@ export interface operations {
             };
             /** @description `prior_not_found`: there is none */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_landmarks: {
+        parameters: {
+            query?: {
+                /** @description Only what changed after this revision; 0 gives all. */
+                since?: number;
+                /** @description Only within `radius_m` of this place: `x,y` in metres. */
+                near?: string;
+                /** @description See `near`. */
+                radius_m?: number;
+                /** @description `both` (if absent), `scanner`, or `sonar`: only what such sensors can tell. */
+                competence?: "both" | "scanner" | "sonar";
+                /** @description Height of the sensor above the level's floor; 0.3 if absent. */
+                height_m?: number;
+            };
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The landmarks */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LandmarkTable"];
+                    "application/cbor": components["schemas"]["LandmarkTable"];
+                };
+            };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description `cursor_expired`: `since` is ahead of the log; read from 0 */
+            410: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -2971,6 +4206,108 @@ export interface operations {
             };
             /** @description `cursor_expired`: `since` is ahead of the log; read from 0 */
             410: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_prototypes: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                site: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The library */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/geo+json": components["schemas"]["PrototypeCollection"];
+                    "application/json": components["schemas"]["PrototypeCollection"];
+                };
+            };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    replace_prototypes: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                site: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/geo+json": components["schemas"]["PrototypeCollection"];
+                "application/json": components["schemas"]["PrototypeCollection"];
+            };
+        };
+        responses: {
+            /** @description The library is so */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PrototypeCollection"];
+                };
+            };
+            /** @description `library_moved_on`: it was changed since; read it again */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description `body_invalid` with `errors` */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description `precondition_required`: send `If-Match` */
+            428: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -48,11 +48,19 @@ pub struct PlanWork {
 }
 
 /// Arranges edges. The parts come in the order of their ends, and depend on the set of edges only.
-pub(super) fn arrange<const N: usize>(mut drawn: Vec<Drawn>) -> (Vec<Part<N>>, PlanWork) {
+pub(super) fn arrange<const N: usize>(drawn: Vec<Drawn>) -> (Vec<Part<N>>, PlanWork) {
+    arrange_within(drawn, usize::MAX).unwrap_or_default()
+}
+
+/// The same; `None` if there are more than `most` crossings or stretches.
+pub(super) fn arrange_within<const N: usize>(
+    mut drawn: Vec<Drawn>,
+    most: usize,
+) -> Option<(Vec<Part<N>>, PlanWork)> {
     drawn.retain(|edge| edge.ends[0] != edge.ends[1]);
     drawn.sort_unstable();
     let segments: Vec<_> = drawn.iter().map(|edge| edge.ends).collect();
-    let snapped = snap(&segments);
+    let snapped = snap(&segments, most)?;
     let mut copies: Vec<(PlanPoint, PlanPoint, Copy)> = snapped
         .parts
         .into_iter()
@@ -87,7 +95,7 @@ pub(super) fn arrange<const N: usize>(mut drawn: Vec<Drawn>) -> (Vec<Part<N>>, P
         above,
         copies,
     });
-    (parts.collect(), work)
+    Some((parts.collect(), work))
 }
 
 /// Area of the places with a property, square micrometres.

@@ -81,6 +81,8 @@ pub enum FindingKind {
         /// The most that they share of any height looked at, square metres.
         area: f64,
     },
+    /// So many objects lie over each other that not all of them were held against each other.
+    TooCrowded,
     /// A doorway that meets no wall.
     DoorwayOutsideWall,
     /// A doorway that opens one face of a wall but does not come out on another.
@@ -94,6 +96,7 @@ impl FindingKind {
             Self::NotPlane { .. }
             | Self::OpenShell { .. }
             | Self::Overlap { .. }
+            | Self::TooCrowded
             | Self::DoorwayNotThrough => Severity::Warning,
             _ => Severity::Error,
         }
@@ -138,6 +141,9 @@ impl fmt::Display for FindingKind {
                 f,
                 "two objects take up the same {:.0} cm2 of floor at one height: move one of them",
                 area * 1e4
+            ),
+            Self::TooCrowded => f.write_str(
+                "more than a million pairs of objects lie over each other, and not all were looked at: take away what stands in the same place",
             ),
             Self::DoorwayOutsideWall => f.write_str("the doorway stands in no wall: move it into one"),
             Self::DoorwayNotThrough => f.write_str(

@@ -10,6 +10,8 @@ use super::{Kind, MICROMETRES, Model, ObjectId, Point3, Structure};
 
 /// Objects that share less than this at every height only touch, square metres.
 const SHARED_MIN: f64 = 1e-4;
+/// The most pairs of objects that are held against each other.
+const PAIRS_MAX: usize = 1_000_000;
 /// The most heights that a pair is looked at.
 const HEIGHTS_MAX: usize = 64;
 
@@ -20,7 +22,11 @@ pub(super) fn between_objects(model: &Model) -> Vec<Finding> {
     let mut findings = Vec::new();
     // For each doorway, the walls whose boxes meet its own.
     let mut walls_at: Vec<Vec<usize>> = vec![Vec::new(); standing.len()];
-    for (a, b) in meeting_boxes(standing) {
+    let pairs = meeting_boxes(standing);
+    if pairs.len() >= PAIRS_MAX {
+        findings.push(Finding { kind: FindingKind::TooCrowded, place: Place::default() });
+    }
+    for (a, b) in pairs {
         match (standing[a].kind, standing[b].kind) {
             (Kind::Doorway, Kind::Wall) => walls_at[a].push(b),
             (Kind::Wall, Kind::Doorway) => walls_at[b].push(a),
@@ -60,6 +66,9 @@ fn meeting_boxes(standing: &[Standing]) -> BTreeSet<(usize, usize)> {
     for (bounds, index) in boxes {
         open.retain(|([_, upper], _)| upper[0] >= bounds[0][0]);
         for (other, second) in &open {
+            if pairs.len() >= PAIRS_MAX {
+                return pairs;
+            }
             if (1..3).all(|k| bounds[0][k] <= other[1][k] && other[0][k] <= bounds[1][k]) {
                 pairs.insert((index.min(*second), index.max(*second)));
             }

@@ -1,11 +1,14 @@
 //! Where an object stands in the level, in three dimensions.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::exact::micrometres;
 
 /// A point in space, in metres; z is the height above the level's floor.
 pub type Point3 = Vector3<f64>;
+
+/// A quaternion shorter than this has no direction.
+const QUATERNION_MIN: f64 = 1e-6;
 
 /// `level_from_object`: how an object's own coordinates lie in the level.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,6 +26,23 @@ impl Placement {
         Self { position, rotation: UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw) }
     }
 
+    /// Turned by a quaternion, `[w, x, y, z]`, which is made a unit; `None` if it is too short for that.
+    pub fn turned(position: Point3, quaternion: [f64; 4]) -> Option<Self> {
+        let [w, x, y, z] = quaternion;
+        let rotation = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), QUATERNION_MIN)?;
+        Some(Self { position, rotation })
+    }
+
+    /// Whether it is turned about the vertical only.
+    pub fn is_upright(&self) -> bool {
+        self.rotation.i == 0.0 && self.rotation.j == 0.0
+    }
+
+    /// The point `p` of the object in the level.
+    pub fn point(&self, p: &Point3) -> Point3 {
+        self.rotation * p + self.position
+    }
+
     /// The object's own coordinates are the level's.
     pub fn identity() -> Self {
         Self { position: Point3::zeros(), rotation: UnitQuaternion::identity() }
@@ -30,7 +50,7 @@ impl Placement {
 
     /// The point `p` of the object in the level, in micrometres; `None` beyond 10 km from its origin.
     pub(super) fn grid_point(&self, p: &Point3) -> Option<[i64; 3]> {
-        let q = self.rotation * p + self.position;
+        let q = self.point(p);
         Some([micrometres(q.x)?, micrometres(q.y)?, micrometres(q.z)?])
     }
 }

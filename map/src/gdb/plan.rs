@@ -111,7 +111,31 @@ pub struct Plan {
     pub(super) work: PlanWork,
 }
 
+/// A plan of which not all can be made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "so many edges lie over each other at this height that the plan has more than {most} crossings: \
+     take away what stands in the same place"
+)]
+pub struct TooCrowded {
+    /// The limit.
+    pub most: usize,
+}
+
 impl Plan {
+    /// Nothing.
+    pub(super) fn empty(height: i64) -> Self {
+        Self {
+            height,
+            owners: Vec::new(),
+            outlines: Vec::new(),
+            sheets: Vec::new(),
+            openings: Vec::new(),
+            walled_up: Vec::new(),
+            work: PlanWork::default(),
+        }
+    }
+
     /// The height of the cut, metres. What ends at it is not met, what begins at it is.
     pub fn height(&self) -> f64 {
         self.height as f64 / super::MICROMETRES
@@ -147,6 +171,11 @@ impl Plan {
     /// The edges of one outline.
     pub fn edges_of<'a>(&'a self, outline: &'a Outline) -> impl Iterator<Item = Edge<'a>> {
         outline.edges.iter().map(|edge| self.edge(edge, Free::Left))
+    }
+
+    /// The edges of one sheet, from one end to the other.
+    pub fn edges_of_sheet<'a>(&'a self, sheet: &'a Sheet) -> impl Iterator<Item = Edge<'a>> {
+        sheet.edges.iter().map(|edge| self.edge(edge, Free::Both))
     }
 
     fn edge(&self, edge: &Bordering, free: Free) -> Edge<'_> {

@@ -20,7 +20,7 @@ impl Polygon {
 
     /// The rings in the order in which findings count them, with the region on the left of each: the
     /// outer one counter-clockwise, holes clockwise.
-    pub(super) fn rings(&self) -> impl Iterator<Item = Vec<Point>> {
+    pub fn rings(&self) -> impl Iterator<Item = Vec<Point>> {
         let outer = std::iter::once((&self.outer, true));
         outer.chain(self.holes.iter().map(|hole| (hole, false))).map(|(ring, wanted)| {
             let mut ring = ring.clone();

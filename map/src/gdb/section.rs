@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use super::arrangement::{Copy, Drawn, Part, arrange};
+use super::arrangement::{Copy, Drawn, Part, arrange_within};
 use super::contours::{Bordering, rings, straightened};
 use super::exact::{PlanPoint, along, side};
 use super::structure::{Standing, height_on_grid};
 use super::winding::Cover;
-use super::{Kind, Opening, OpeningSide, Outline, Owner, Plan, Sheet, Structure};
+use super::{Kind, Opening, OpeningSide, Outline, Owner, Plan, Sheet, Structure, TooCrowded};
 
 const WALLS: usize = 0;
 const DOORWAYS: usize = 1;
@@ -30,10 +30,27 @@ impl Structure {
     pub fn plan(&self, height: f64) -> Plan {
         plan(self.standing.iter(), height_on_grid(height))
     }
+
+    /// The same for a model that anybody may have drawn: whose plan has more than `most` crossings or
+    /// stretches is too crowded, and takes no more room than so many.
+    ///
+    /// # Errors
+    /// [`TooCrowded`].
+    pub fn plan_within(&self, height: f64, most: usize) -> Result<Plan, TooCrowded> {
+        plan_within(self.standing.iter(), height_on_grid(height), most).ok_or(TooCrowded { most })
+    }
 }
 
 /// The plan of some objects, which come in the order of their ids.
 pub(super) fn plan<'a>(standing: impl Iterator<Item = &'a Standing>, height: i64) -> Plan {
+    plan_within(standing, height, usize::MAX).unwrap_or_else(|| Plan::empty(height))
+}
+
+fn plan_within<'a>(
+    standing: impl Iterator<Item = &'a Standing>,
+    height: i64,
+    most: usize,
+) -> Option<Plan> {
     let (mut owners, mut drawn) = (Vec::new(), Vec::new());
     for object in standing {
         let layer = match object.kind {
@@ -51,7 +68,7 @@ pub(super) fn plan<'a>(standing: impl Iterator<Item = &'a Standing>, height: i64
             drawn.extend(sheets.into_iter().map(|ends| Drawn { ends, layer: None, owner }));
         }
     }
-    let (parts, work) = arrange::<3>(drawn);
+    let (parts, work) = arrange_within::<3>(drawn, most)?;
     let mut plan = Plan {
         height,
         outlines: outlines(&parts, &owners, solid),
@@ -62,7 +79,7 @@ pub(super) fn plan<'a>(standing: impl Iterator<Item = &'a Standing>, height: i64
         work,
     };
     plan.openings.retain(|opening| !opening.sides.is_empty());
-    plan
+    Some(plan)
 }
 
 /// The part as a border with what is solid on its right.

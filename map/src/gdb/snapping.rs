@@ -97,13 +97,22 @@ pub(super) struct Snapped {
     pub(super) pairs: u64,
 }
 
-/// Bends segments (none of length 0) so that they meet only at their ends.
-pub(super) fn snap(segments: &[[PlanPoint; 2]]) -> Snapped {
+/// Bends segments (none of length 0) so that they meet only at their ends. `None` if there are more than `most`
+/// crossings or parts: they are the square of the number of segments if these are drawn so.
+pub(super) fn snap(segments: &[[PlanPoint; 2]], most: usize) -> Option<Snapped> {
     let squares = Squares::of(segments);
     let mut pixels: Vec<PlanPoint> = segments.iter().flatten().copied().collect();
+    let mut crossings = 0;
     let mut pairs = squares.each_pair(segments, |a, b| {
-        pixels.extend(crossing(segments[a as usize], segments[b as usize]));
+        if crossings < most {
+            let crossing = crossing(segments[a as usize], segments[b as usize]);
+            crossings += usize::from(crossing.is_some());
+            pixels.extend(crossing);
+        }
     });
+    if crossings >= most {
+        return None;
+    }
     pixels.sort_unstable();
     pixels.dedup();
     let mut by_square: BTreeMap<Square, Vec<PlanPoint>> = BTreeMap::new();
@@ -130,9 +139,12 @@ pub(super) fn snap(segments: &[[PlanPoint; 2]]) -> Snapped {
         });
         on_the_way.sort_unstable_by_key(|p| along(from, to, *p));
         on_the_way.dedup();
+        if parts.len() + on_the_way.len() > most {
+            return None;
+        }
         parts.extend(on_the_way.windows(2).map(|w| (w[0], w[1], index as u32)));
     }
-    Snapped { parts, pairs }
+    Some(Snapped { parts, pairs })
 }
 
 #[cfg(test)]
@@ -152,7 +164,8 @@ mod tests {
                 .map(|v| [PlanPoint { x: v[0], y: v[1] }, PlanPoint { x: v[2], y: v[3] }])
                 .filter(|[a, b]| a != b)
                 .collect();
-            let snapped = snap(&segments).parts;
+            let snapped = snap(&segments, usize::MAX).map_or_else(Vec::new, |snapped| snapped.parts);
+            prop_assert!(snapped.len() >= segments.len());
             for (i, (a, b, index)) in snapped.iter().enumerate() {
                 prop_assert!(a != b);
                 let whole = segments[*index as usize];

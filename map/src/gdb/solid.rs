@@ -72,7 +72,8 @@ impl Cylinder {
         sides.clamp(CYLINDER_SIDES_MIN, CYLINDER_SIDES_MAX) as usize
     }
 
-    fn base(&self) -> Polygon {
+    /// The polygon of the prism.
+    pub fn base(&self) -> Polygon {
         let sides = self.sides();
         let corner = |k: usize| {
             let (s, c) = (TAU * k as f64 / sides as f64).sin_cos();

@@ -2,7 +2,7 @@
 
 use mapfold_map::gdb::{
     Cylinder, Face, Kind, LandmarkConfig, Object, Placement, Point3, Polygon, Polyhedron,
-    PriorConfig, Solid, Structure, findings, footprints, landmarks, prior,
+    PriorConfig, Solid, Structure, TooCrowded, findings, footprints, landmarks, prior,
 };
 use mapfold_map::geometry::Point;
 use nalgebra::UnitQuaternion;
@@ -93,4 +93,34 @@ proptest! {
         let config = PriorConfig { cells_max: 200_000, ..PriorConfig::standard(0.25) };
         let _ = prior(&plan, &config);
     }
+}
+
+/// Half of them lie across the other half: crossings are the square of what is drawn.
+#[test]
+fn a_plan_with_more_crossings_than_one_may_have_is_refused_before_it_fills_the_memory() {
+    let rail = |number: u32| {
+        let at = f64::from(number / 2);
+        let (from, to) = if number.is_multiple_of(2) {
+            ([0.0, at, 0.0], [500.0, at + 0.5, 1.0])
+        } else {
+            ([at, 0.0, 0.0], [at + 0.5, 500.0, 1.0])
+        };
+        Object::of(Kind::Machine, vec![Solid::cuboid(from, to)])
+    };
+    let structure = Structure::of(&model((0..200).map(rail)));
+    // Two edges of each cross two of each that lies across.
+    assert_eq!(structure.plan_within(0.5, 40_000), Err(TooCrowded { most: 40_000 }));
+    let whole = structure.plan_within(0.5, 200_000).unwrap();
+    assert_eq!(whole, structure.plan(0.5));
+    assert_eq!(whole.outlines().len(), 99 * 99 + 1);
+    // Where nothing stands, nothing is crowded.
+    assert_eq!(structure.plan_within(2.0, 1).unwrap().outlines(), []);
+    // The same with walls that lie on each other: no crossings, but as many stretches.
+    let pile = |number: u32| {
+        let at = f64::from(number) * 0.01;
+        Object::of(Kind::Machine, vec![Solid::cuboid([at, 0.0, 0.0], [at + 100.0, 1.0, 1.0])])
+    };
+    let structure = Structure::of(&model((0..300).map(pile)));
+    assert!(structure.plan_within(0.5, 10_000).is_err());
+    assert!(structure.plan_within(0.5, 1_000_000).is_ok());
 }

@@ -1,6 +1,6 @@
 //! The closed sets of words (enumerations), between the wire and the map's types, both ways.
 
-use mapfold_map::{level, raster, vector};
+use mapfold_map::{gdb, landmarks, level, raster, vector};
 
 use crate::v1;
 
@@ -30,3 +30,12 @@ same_words!(v1::EndKind, vector::EndKind, Corner, Jump, Occluded);
 same_words!(v1::ChainKind, vector::ChainKind, Polyline, Obstacle, Room);
 same_words!(v1::SensorClass, raster::SensorClass, Scanner, Sonar);
 same_words!(v1::Provenance, level::Provenance, Datum, SharedMap, Odometry);
+same_words!(v1::ObjectKind, gdb::Kind, Wall, Doorway, Corridor, Machine, Furniture, Other);
+same_words!(
+    v1::LandmarkKind,
+    landmarks::LandmarkKind,
+    ConvexCorner,
+    ConcaveCorner,
+    WallEnd,
+    Doorway
+);

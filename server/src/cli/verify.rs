@@ -54,7 +54,7 @@ async fn asked_for(
 fn tell(report: &Report) -> Result<(), CommandError> {
     let verdict = if report.is_sound() { "sound" } else { "NOT SOUND" };
     say(&format!(
-        "{}/{}: {verdict}; revision {}, folded up to {}; {} contributions, {}{}{} segments, {} clusters, \
+        "{}/{}: {verdict}; revision {}, folded up to {}; {} contributions, {}{}{}{} segments, {} clusters, \
          {} chains, {} tiles; map {}",
         report.site,
         report.level,
@@ -67,6 +67,11 @@ fn tell(report: &Report) -> Result<(), CommandError> {
             format!("{} of them reverted, {} acts, ", report.reverted, report.acts)
         },
         if report.imports == 0 { String::new() } else { format!("{} imports, ", report.imports) },
+        if report.gdb_entries == 0 {
+            String::new()
+        } else {
+            format!("{} entries about the GDB, ", report.gdb_entries)
+        },
         report.segments,
         report.clusters,
         report.chains,

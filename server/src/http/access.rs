@@ -34,6 +34,8 @@ pub(super) struct Read;
 pub(super) struct Contribute;
 /// Needs `map:edit`.
 pub(super) struct Edit;
+/// Needs `map:publish`.
+pub(super) struct Publish;
 /// Needs `admin`.
 pub(super) struct Admin;
 
@@ -47,6 +49,10 @@ impl Needs for Contribute {
 
 impl Needs for Edit {
     const SCOPE: Scope = Scope::MapEdit;
+}
+
+impl Needs for Publish {
+    const SCOPE: Scope = Scope::MapPublish;
 }
 
 impl Needs for Admin {

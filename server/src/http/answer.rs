@@ -28,7 +28,10 @@ pub(super) const DATA: &Offer = &[codec::JSON, codec::CBOR];
 /// What the vector map can be had as.
 pub(super) const DATA_OR_GEOJSON: &Offer = &[codec::JSON, codec::CBOR, geojson::MEDIA_TYPE];
 
-/// A strong validator: a quoted digest.
+/// What collections of features can be had as.
+pub(super) const FEATURES: &Offer = &[geojson::MEDIA_TYPE, codec::JSON];
+
+/// A strong validator: a quoted digest or name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Tag(String);
 
@@ -47,6 +50,16 @@ impl Tag {
         }
         text.push('"');
         Self(text)
+    }
+
+    /// By a name that stands for the bytes: digits, letters and points.
+    pub(super) fn named(name: &str) -> Self {
+        Self(format!("\"{name}\""))
+    }
+
+    /// As the value of a header.
+    pub(super) fn header(&self) -> Option<HeaderValue> {
+        HeaderValue::from_str(&self.0).ok()
     }
 
     /// By all that the bytes depend on: for files that would be dear to write only to compare.
@@ -101,6 +114,7 @@ impl Reader {
         }
         let offered = match offer.len() {
             1 => first,
+            2 if offer == FEATURES => "application/geo+json or application/json",
             2 => "application/json or application/cbor",
             _ => "application/json, application/cbor or application/geo+json",
         };
@@ -207,7 +221,7 @@ pub(super) fn created<T: Serialize>(
 }
 
 fn validators(headers: &mut HeaderMap, tag: &Tag) {
-    if let Ok(tag) = HeaderValue::from_str(&tag.0) {
+    if let Some(tag) = tag.header() {
         headers.insert(ETAG, tag);
     }
     headers.insert(CACHE_CONTROL, HeaderValue::from_static("private, no-cache"));

@@ -71,6 +71,15 @@ impl Findings {
     }
 }
 
+/// What an entry of the log is for.
+pub(super) fn comment(comment: &str) -> Result<(), ApiError> {
+    if comment.len() <= REASON_LENGTH_MAX && !comment.chars().any(char::is_control) {
+        return Ok(());
+    }
+    let words = "`comment` is at most 500 bytes without control characters.";
+    Err(ApiError::Query(words.to_owned()))
+}
+
 /// A site to be made.
 pub(super) fn new_site(new: &NewSite) -> Result<(), ApiError> {
     let mut findings = Findings::default();

@@ -10,8 +10,8 @@ use utoipa::{Modify, OpenApi as _};
 use super::access::SESSION_COOKIE;
 use super::problem::ApiError;
 use super::{
-    batch, contributions, events, exports, health, imports, levels, patches, raster, reverts,
-    robots, session, sites, tiles, vector,
+    batch, contributions, events, exports, gdb, health, imports, landmarks, levels, patches, plan,
+    prototypes, raster, reverts, robots, session, sites, tiles, vector,
 };
 
 /// What stands at the head of the description.
@@ -26,7 +26,8 @@ RFC 9457 problem (`application/problem+json`) with a stable `code`; where it is 
 `Retry-After` says when to try again. What a token does not reach is not found.";
 
 /// Tags of what is read with a validator.
-const TAGS_WITH_VALIDATORS: [&str; 5] = ["sites", "levels", "robots", "contributions", "map"];
+const TAGS_WITH_VALIDATORS: [&str; 6] =
+    ["sites", "levels", "robots", "contributions", "map", "gdb"];
 
 #[derive(utoipa::OpenApi)]
 #[openapi(
@@ -39,6 +40,9 @@ const TAGS_WITH_VALIDATORS: [&str; 5] = ["sites", "levels", "robots", "contribut
         reverts::create, reverts::list, reverts::describe, reverts::undo,
         vector::read, raster::changes, raster::tile, batch::read, tiles::read, patches::read,
         events::follow, exports::read, imports::create, imports::list, imports::remove,
+        gdb::read, gdb::replace, gdb::edit, gdb::publish, gdb::entries,
+        plan::findings, plan::read, plan::make_prior, landmarks::read,
+        prototypes::read, prototypes::replace,
         session::sign_in, session::describe, session::sign_out,
         health::live, health::ready, health::metrics,
     ),
@@ -51,6 +55,7 @@ const TAGS_WITH_VALIDATORS: [&str; 5] = ["sites", "levels", "robots", "contribut
         (name = "robots", description = "Who contributes, with which sensors"),
         (name = "contributions", description = "Uploads, the log that they make, and reverts"),
         (name = "map", description = "The shared map, folded from all contributions"),
+        (name = "gdb", description = "The building as it was meant to be: drafts, publications, plans, landmarks"),
         (name = "session", description = "Signing in on the page"),
         (name = "health", description = "For those who run the server"),
     ),

@@ -1,6 +1,8 @@
 //! Every error of the HTTP side, and the problem (RFC 9457) that it becomes. The only place that
 //! knows which error is which status.
 
+pub(super) mod gdb;
+
 use std::sync::Arc;
 
 use axum::http::StatusCode;
@@ -15,6 +17,7 @@ use crate::level::{LevelError, RevertError, SinceError, SubmitError};
 use crate::store::StoreError;
 use crate::store::acts::RevertRefusal;
 use crate::store::payload::PayloadError;
+use gdb::GdbRefusal;
 
 /// Why a request is refused.
 #[derive(Debug)]
@@ -73,6 +76,8 @@ pub(super) enum ApiError {
     Store(StoreError),
     /// There is no image of this map.
     Nav2(Nav2Error),
+    /// The GDB was not changed, or cannot be shown.
+    Gdb(Box<GdbRefusal>),
     /// A fault of ours.
     Internal(String),
 }
@@ -200,6 +205,7 @@ impl ApiError {
                 };
                 of(409, code, sentence(&error.to_string()))
             }
+            Self::Gdb(refusal) => gdb::problem(refusal),
             Self::Internal(_) => of(500, "internal", "The server is at fault; its log says more."),
         }
     }

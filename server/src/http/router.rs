@@ -8,8 +8,8 @@ use mapfold_schema::route;
 use super::problem::ApiError;
 use super::state::App;
 use super::{
-    batch, contributions, docs, events, exports, health, imports, layers, levels, page, patches,
-    raster, reverts, robots, session, sites, tiles, vector,
+    batch, contributions, docs, events, exports, gdb, health, imports, landmarks, layers, levels,
+    page, patches, plan, prototypes, raster, reverts, robots, session, sites, tiles, vector,
 };
 
 /// All routes, with all layers around them.
@@ -44,6 +44,25 @@ pub fn router(app: &App) -> Router {
             get(imports::list)
                 .post(imports::create)
                 .delete(imports::remove)
+                .layer(DefaultBodyLimit::max(upload_bytes)),
+        )
+        .route(
+            route::GDB,
+            get(gdb::read)
+                .put(gdb::replace)
+                .patch(gdb::edit)
+                .layer(DefaultBodyLimit::max(upload_bytes)),
+        )
+        .route(route::GDB_PUBLICATIONS, post(gdb::publish))
+        .route(route::GDB_ENTRIES, get(gdb::entries))
+        .route(route::GDB_FINDINGS, get(plan::findings))
+        .route(route::GDB_PLAN, get(plan::read))
+        .route(route::GDB_PRIOR, post(plan::make_prior))
+        .route(route::LANDMARKS, get(landmarks::read))
+        .route(
+            route::PROTOTYPES,
+            get(prototypes::read)
+                .put(prototypes::replace)
                 .layer(DefaultBodyLimit::max(upload_bytes)),
         )
         .route(

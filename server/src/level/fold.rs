@@ -180,7 +180,7 @@ impl Folder {
                         progress.robots.insert(Arc::clone(&logged.contribution.robot));
                         metrics::histogram!("mapfold_fold_duration_seconds").record(took);
                     }
-                    Entry::Import(_) => progress.acts += 1,
+                    Entry::Import(_) | Entry::Gdb(_) => progress.acts += 1,
                     Entry::Act(_) => {
                         progress.acts += 1;
                         metrics::histogram!("mapfold_act_duration_seconds").record(took);

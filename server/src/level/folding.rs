@@ -99,6 +99,10 @@ impl Folding {
                 let tiles = imported.replace(&mut self.history.prior);
                 return Ok(ChangeCounts { features: 0, tiles });
             }
+            Entry::Gdb(_) => {
+                self.revision = revision;
+                return Ok(ChangeCounts::default());
+            }
         };
         self.revision = revision;
         Ok(self.history.record(&changes, &self.level, revision))

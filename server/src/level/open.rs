@@ -105,11 +105,16 @@ async fn restore(
     }
     let acts = store.acts_between(&row.site, &row.level, 0, stored.folded_revision).await?;
     let (imports, prior) = prior::restore(store, row, stored.folded_revision).await?;
-    if (log.len() + acts.len() + imports) as i64 != stored.folded_revision {
+    let gdb = store.gdb_entry_count(&row.site, &row.level, stored.folded_revision).await?;
+    if (log.len() + acts.len() + imports) as i64 + gdb != stored.folded_revision {
         return Err(spoilt(
             "contributions",
             format!("revisions up to {}", stored.folded_revision),
-            format!("there are {}, {} acts and {imports} imports", log.len(), acts.len()),
+            format!(
+                "there are {}, {} acts, {imports} imports and {gdb} entries about the GDB",
+                log.len(),
+                acts.len()
+            ),
         ));
     }
     let (config, stored) = (recall::config(row), Arc::clone(stored));

@@ -60,6 +60,8 @@ pub(crate) enum Entry {
     Act(Box<Act>),
     /// A map of another program, as the prior.
     Import(Box<Imported>),
+    /// About the GDB, at this revision: the fold does not read it.
+    Gdb(i64),
 }
 
 impl Entry {
@@ -69,12 +71,13 @@ impl Entry {
             Self::Contribution(logged) => logged.revision,
             Self::Act(act) => act.revision,
             Self::Import(imported) => imported.revision,
+            Self::Gdb(revision) => *revision,
         }
     }
 }
 
-/// The next entries of a level's log after revision `after`; none if it has ended. An act or
-/// an import comes alone, so that there is only one batch in memory at a time.
+/// The next entries of a level's log after revision `after`; none if it has ended. An act,
+/// an import or an entry about the GDB comes alone, so that there is only one batch in memory at a time.
 ///
 /// # Errors
 /// The store fails, or the log does not hold what was accepted.
@@ -89,6 +92,9 @@ pub(crate) async fn entries_after(
     }
     if let Some(import) = stretch.import.filter(|_| stretch.contributions.is_empty()) {
         return Ok(vec![Entry::Import(Box::new(imported(store, row, import).await?))]);
+    }
+    if let Some(revision) = stretch.gdb.filter(|_| stretch.contributions.is_empty()) {
+        return Ok(vec![Entry::Gdb(revision)]);
     }
     let (rows, target) = (stretch.contributions, target(row));
     let entry = move |row: &LogRow| whole(row, &target).map(Entry::Contribution);

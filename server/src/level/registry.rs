@@ -10,6 +10,7 @@ use tokio::task::JoinHandle;
 
 use super::append::Appender;
 use super::fold::Folder;
+use super::gdb::ModelCache;
 use super::open::{self, Opened};
 use super::snapshot::Snapshot;
 use super::write_behind::Writer;
@@ -303,6 +304,7 @@ impl Inner {
             head,
             look,
             trials,
+            models: ModelCache::default(),
             store: self.store.clone(),
             alarm: self.alarm.clone(),
         });

@@ -15,6 +15,7 @@ use mapfold_schema::digest::content_digest;
 use sha2::{Digest, Sha256};
 
 use crate::level::folding::Folding;
+use crate::level::gdb;
 use crate::level::prior::Imported;
 use crate::level::recall::{self, Act, Entry, Logged};
 use crate::level::rows;
@@ -47,6 +48,8 @@ pub struct Report {
     pub acts: usize,
     /// Imports read.
     pub imports: usize,
+    /// Entries about the GDB read.
+    pub gdb_entries: usize,
     /// Segments of the refolded map.
     pub segments: usize,
     /// Clusters of the refolded map.
@@ -94,6 +97,7 @@ pub async fn verify(store: &Store, site: &str, level: &str) -> Result<Option<Rep
         stretch.contributions.retain(|row| row.revision <= until);
         stretch.act = stretch.act.filter(|act| act.revision <= until);
         stretch.import = stretch.import.filter(|import| *import <= until);
+        stretch.gdb = stretch.gdb.filter(|entry| *entry <= until);
         let Some(end) = stretch.end() else { break };
         after = end;
         check = check.aside(move |check| check.fold(&stretch.contributions)).await?;
@@ -117,6 +121,16 @@ pub async fn verify(store: &Store, site: &str, level: &str) -> Result<Option<Rep
                 Err(error) => return Err(error),
             };
         }
+        if let Some(entry) = stretch.gdb {
+            check = match gdb::check_entry(store, site, level, entry).await {
+                Ok(()) => check.aside(move |check| check.step_gdb(entry)).await?,
+                Err(error @ StoreError::Corrupt { .. }) => {
+                    check.pass_over(entry, &error.to_string());
+                    check
+                }
+                Err(error) => return Err(error),
+            };
+        }
     }
     check = check.catch_up(store, &row).await?;
     let later = store.acts_between(site, level, until, i64::MAX).await?;
@@ -130,6 +144,7 @@ struct Check {
     reversed: Level,
     acts: Acts,
     imports: usize,
+    gdb_entries: usize,
     /// Revisions of rows that say of themselves what the acts do not.
     astray: Vec<i64>,
     read: i64,
@@ -150,6 +165,7 @@ impl Check {
             reversed: Level::new(recall::config(row)),
             acts,
             imports: 0,
+            gdb_entries: 0,
             astray: Vec::new(),
             read: 0,
             last: 0,
@@ -220,6 +236,14 @@ impl Check {
     fn step_act(&mut self, act: Act) {
         self.follow(act.revision);
         self.step(&Entry::Act(Box::new(act)));
+        self.compare_here();
+    }
+
+    /// Nor are entries about the GDB: that their objects can be read has been looked at.
+    fn step_gdb(&mut self, revision: i64) {
+        self.gdb_entries += 1;
+        self.follow(revision);
+        self.step(&Entry::Gdb(revision));
         self.compare_here();
     }
 
@@ -394,6 +418,7 @@ impl Check {
             reverted: self.acts.out.len(),
             acts: self.acts.count,
             imports: self.imports,
+            gdb_entries: self.gdb_entries,
             segments: map.segments.len(),
             clusters: map.clusters.len(),
             chains: map.chains.len(),

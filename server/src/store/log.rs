@@ -6,6 +6,7 @@ use sqlx::any::AnyRow;
 use uuid::Uuid;
 
 use super::acts::{ActRow, first_act_after};
+use super::gdb::first_gdb_entry_after;
 use super::imports::first_import_after;
 use super::payload::{self, Payload};
 use super::row::{corrupt, count, get, next_page};
@@ -56,7 +57,8 @@ pub struct FeaturesRow {
     pub features: Vec<u8>,
 }
 
-/// The next entries of a log: contributions, and the act or import that follows them, if one does.
+/// The next entries of a log: contributions, and the act, import or entry about the GDB that follows them, if one
+/// does.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LogStretch {
     /// Contributions, oldest first.
@@ -65,13 +67,15 @@ pub struct LogStretch {
     pub act: Option<ActRow>,
     /// Revision of the import after them, likewise; there is never an act too.
     pub import: Option<i64>,
+    /// Revision of the entry about the GDB after them, likewise.
+    pub gdb: Option<i64>,
 }
 
 impl LogStretch {
     /// Revision of its last entry; `None` if the log has ended.
     pub fn end(&self) -> Option<i64> {
         let last = self.contributions.last().map(|row| row.revision);
-        self.act.as_ref().map(|act| act.revision).or(self.import).or(last)
+        self.act.as_ref().map(|act| act.revision).or(self.import).or(self.gdb).or(last)
     }
 }
 
@@ -183,7 +187,7 @@ impl Store {
     }
 
     /// The next entries of a level's log after revision `after`: at most `limit` contributions, and
-    /// the act or import that follows them, all of one moment.
+    /// the act, import or entry about the GDB that follows them, all of one moment.
     ///
     /// # Errors
     /// The store fails, or a row is spoilt.
@@ -198,13 +202,15 @@ impl Store {
         let act = first_act_after(&mut tx, site, level, after).await?;
         let import = first_import_after(&mut tx, site, level, after).await?;
         let act_revision = act.as_ref().map_or(i64::MAX, |act| act.revision);
-        let until = act_revision.min(import.unwrap_or(i64::MAX));
+        let gdb = first_gdb_entry_after(&mut tx, site, level, after).await?;
+        let until = act_revision.min(import.unwrap_or(i64::MAX)).min(gdb.unwrap_or(i64::MAX));
         let contributions = log_rows_between(&mut tx, site, level, after, until, limit).await?;
         tx.rollback().await?;
         let reached = |revision| contributions.len() < limit as usize && revision == until;
         let act = act.filter(|act| reached(act.revision));
         let import = import.filter(|import| reached(*import));
-        Ok(LogStretch { contributions, act, import })
+        let gdb = gdb.filter(|entry| reached(*entry));
+        Ok(LogStretch { contributions, act, import, gdb })
     }
 
     /// The rows of these revisions, in no order; one that is not there is left out.

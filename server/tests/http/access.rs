@@ -80,6 +80,17 @@ fn table(floor: &Level, look: &Value) -> Vec<Row> {
         ("GET", level(route::IMPORTS), none.clone(), read),
         ("POST", level(route::IMPORTS), json!("no zip"), [401, 403, 404, 403, 415]),
         ("DELETE", level(route::IMPORTS), none.clone(), [401, 403, 404, 403, 404]),
+        ("GET", level(route::GDB), none.clone(), read),
+        ("PUT", level(route::GDB), json!({}), [401, 403, 404, 403, 428]),
+        ("PATCH", level(route::GDB), json!({}), [401, 403, 404, 403, 428]),
+        ("POST", level(route::GDB_PUBLICATIONS), none.clone(), [401, 403, 404, 403, 428]),
+        ("GET", level(route::GDB_ENTRIES), none.clone(), read),
+        ("GET", level(route::GDB_FINDINGS), none.clone(), read),
+        ("GET", level(route::GDB_PLAN), none.clone(), read),
+        ("POST", level(route::GDB_PRIOR), none.clone(), [401, 403, 404, 403, 404]),
+        ("GET", level(route::LANDMARKS), none.clone(), read),
+        ("GET", site(route::PROTOTYPES), none.clone(), read),
+        ("PUT", site(route::PROTOTYPES), json!({}), [401, 403, 404, 403, 428]),
         ("GET", route::SESSION.to_owned(), none.clone(), [401, 200, 200, 200, 200]),
         ("DELETE", route::SESSION.to_owned(), none, [401, 204, 204, 204, 204]),
     ]
@@ -157,7 +168,7 @@ fn template_of(path: &str) -> String {
 }
 
 /// A token that only the command line makes.
-async fn token(
+pub(crate) async fn token(
     server: &Server,
     site: Option<&str>,
     robot: Option<&str>,

@@ -20,6 +20,7 @@ mod description;
 mod engines;
 mod events;
 mod exports;
+mod gdb;
 mod imports;
 mod layers;
 mod life;

@@ -15,6 +15,7 @@ mod engines;
 mod synthetic;
 
 mod faults;
+mod gdb;
 mod imports;
 mod levels_in_memory;
 mod log;
