@@ -1,13 +1,17 @@
 // The server's HTTP API, one function per request that the page makes. Every failure is one of two:
 // the server refused (with its problem), or it could not be reached.
 
+import type { ModelView } from "./model";
 import type { Place } from "./permalink";
 import type { Evidence, PictureAddress } from "./pyramid";
 import type {
   ContributionPage,
+  GdbEntryPage,
+  GdbPlan,
   Import,
   ImportPage,
   ImportReport,
+  LandmarkTable,
   LevelDescription,
   NewRevert,
   Problem,
@@ -78,6 +82,12 @@ export interface Api {
   importPrior: (place: Place, zip: Blob, trust: number) => Promise<Import>;
   /** Takes the prior away. */
   removePrior: (place: Place) => Promise<Import>;
+  /** The newest edits and publications of the a-priori model. */
+  modelEntries: (place: Place, limit: number, signal: AbortSignal) => Promise<GdbEntryPage>;
+  /** What a sensor at a height would see of it. */
+  plan: (place: Place, view: ModelView, signal: AbortSignal) => Promise<GdbPlan>;
+  /** Its landmarks at a height, as it is published. */
+  landmarks: (place: Place, heightM: number, signal: AbortSignal) => Promise<LandmarkTable>;
   vector: (place: Place, since: number, signal: AbortSignal) => Promise<VectorPatch>;
   raster: (place: Place, since: number, signal: AbortSignal) => Promise<RasterChanges>;
   /** One picture of the raster; null where there is nothing to see. */
@@ -191,6 +201,10 @@ export function createApi(browser: Browser): Api {
       askJson(`${levelPath(place)}/imports?preview=true&trust=${trust}`, { ...zip(map), signal }),
     importPrior: (place, map, trust) => askJson(`${levelPath(place)}/imports?trust=${trust}`, zip(map)),
     removePrior: (place) => askJson(`${levelPath(place)}/imports`, { method: "DELETE" }),
+    modelEntries: (place, limit, signal) => askJson(`${levelPath(place)}/gdb/entries?limit=${limit}`, { signal }),
+    plan: (place, { heightM, state }, signal) =>
+      askJson(`${levelPath(place)}/gdb/plan?height_m=${heightM}&state=${state}`, { signal }),
+    landmarks: (place, heightM, signal) => askJson(`${levelPath(place)}/landmarks?height_m=${heightM}`, { signal }),
     vector: (place, since, signal) => askJson(`${levelPath(place)}/vector?since=${since}`, { signal }),
     raster: (place, since, signal) => askJson(`${levelPath(place)}/raster?since=${since}`, { signal }),
     picture: async (place, picture, evidence) => {

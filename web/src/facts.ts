@@ -7,6 +7,8 @@
 //   data-segments         segments that are painted (on the screen or beside it)
 //   data-pieces-painted   straight pieces of them that are on the screen
 //   data-clusters, data-chains, data-robots
+//   data-model            height and corners of the plan of the a-priori model; empty without one
+//   data-landmarks        landmarks of the published model
 //   data-tiles            tiles that hold evidence
 //   data-tiles-loaded     pictures of the raster that are loaded
 //   data-tiles-pending    pictures on the screen that are missing or stale
@@ -30,11 +32,14 @@ export function createFacts(root: HTMLElement): Facts {
     if (root.dataset[name] !== text) root.dataset[name] = text;
   };
   return {
-    drawn({ session, place, link }) {
+    drawn({ session, place, link, model }) {
       say("session", session.kind);
       say("site", place?.site ?? "");
       say("level", place?.level ?? "");
       say("live", link.kind);
+      const corners = [...(model.plan?.outlines ?? []), ...(model.plan?.sheets ?? [])].flat().length;
+      say("model", model.plan === null ? "" : `${model.plan.height_m} ${corners}`);
+      say("landmarks", model.landmarks.size);
     },
     painted(state, { piecesPainted, picturesLoaded, picturesPending }) {
       const { content } = state;

@@ -1,7 +1,7 @@
 // The layers of the map, from below to above.
 
 /** Names of layers, as in permalinks. */
-export const LAYER_NAMES = ["raster", "grid", "clusters", "chains", "segments", "robots"] as const;
+export const LAYER_NAMES = ["raster", "grid", "model", "clusters", "chains", "segments", "landmarks", "robots"] as const;
 
 export type LayerName = (typeof LAYER_NAMES)[number];
 
@@ -17,9 +17,11 @@ export type Layers = Readonly<Record<LayerName, LayerSetting>>;
 export const DEFAULT_LAYERS: Layers = {
   raster: { on: true, opacity: 1 },
   grid: { on: false, opacity: 1 },
+  model: { on: true, opacity: 1 },
   clusters: { on: true, opacity: 1 },
   chains: { on: true, opacity: 1 },
   segments: { on: true, opacity: 1 },
+  landmarks: { on: false, opacity: 1 },
   robots: { on: true, opacity: 1 },
 };
 
@@ -27,8 +29,10 @@ export const DEFAULT_LAYERS: Layers = {
 export const LAYER_TITLES: Readonly<Record<LayerName, string>> = {
   raster: "Occupancy",
   grid: "Grid",
+  model: "Model (as planned)",
   clusters: "Clusters",
   chains: "Chains",
   segments: "Segments",
+  landmarks: "Landmarks",
   robots: "Robots",
 };

@@ -7,6 +7,7 @@ import { createFacts } from "./facts";
 import { followLevel } from "./feed";
 import { createImportActions } from "./importing";
 import { createMapView } from "./map/view";
+import { followModel, type ModelFollower } from "./modelling";
 import { DARK, LIGHT, type Theme } from "./palette";
 import { createContributionsCard } from "./panels/contributions_card";
 import { createHeader } from "./panels/header";
@@ -105,6 +106,7 @@ darkScheme.addEventListener("change", () => {
 
 // Acting on changes: following the chosen level, and keeping the address bar up to date.
 let unfollow: (() => void) | null = null;
+let model: ModelFollower | null = null;
 store.onChange((state, before) => {
   const follows = state.session.kind === "in" && state.sites !== null ? state.place : null;
   const followed = before.session.kind === "in" && before.sites !== null ? before.place : null;
@@ -121,10 +123,14 @@ store.onChange((state, before) => {
             openEvents: (path) => new EventSource(path),
             timers,
           });
+    model?.stop();
+    model = follows === null ? null : followModel({ place: follows, api, state: store.state, dispatch, timers });
   }
 });
 store.onChange((state, before) => {
   if (state.log.open && before.contributions !== state.contributions) log.refresh();
+  const isAnotherModel = before.model.view !== state.model.view || before.level?.revision !== state.level?.revision;
+  if (isAnotherModel || before.layers !== state.layers) model?.look();
   if (state.imports.open && before.level !== state.level) prior.refresh();
 });
 store.onChange((state) => {

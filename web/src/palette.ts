@@ -24,6 +24,10 @@ export interface Theme {
   several: string;
   /** Chains: the band beneath their walls, and the inside of polygons. */
   chain: string;
+  /** The plan of the a-priori model. */
+  model: string;
+  /** Landmarks. */
+  landmark: string;
   /** What a robot that is not heard is drawn in. */
   silent: string;
   grid: string;
@@ -42,6 +46,8 @@ export const LIGHT: Theme = {
   robots: ["#0072b2", "#cc3366", "#556600", "#9966ff", "#660077", "#1100bb"],
   several: "#1f2933",
   chain: "#0f8f7a",
+  model: "#5b3a29",
+  landmark: "#b3005e",
   silent: "#7b8794",
   grid: "rgba(31, 41, 51, 0.10)",
   gridAxis: "rgba(31, 41, 51, 0.38)",
@@ -57,6 +63,8 @@ export const DARK: Theme = {
   robots: ["#56b4e9", "#ff5599", "#77ee77", "#9966ff", "#009966", "#e69f00"],
   several: "#f1f5f9",
   chain: "#3fd0b6",
+  model: "#e3c9a8",
+  landmark: "#ff8ad0",
   silent: "#8b98a5",
   grid: "rgba(241, 245, 249, 0.10)",
   gridAxis: "rgba(241, 245, 249, 0.40)",

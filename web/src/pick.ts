@@ -1,7 +1,8 @@
-// What lies under a point of the map: the nearest of what is shown, robots before the corners of
+// What lies under a point of the map: the nearest of what is shown, robots before landmarks before the corners of
 // chains before walls before clusters before the rest of chains.
 
 import { distanceToPiece, edgesOf, hullContains, piecesOf, ringContains, type Point } from "./geometry";
+import { landmarkAt } from "./model";
 import { robotsHere, type Selection, type State } from "./state";
 
 /** How far from a thing still counts as on it. */
@@ -12,6 +13,7 @@ const LINE_PX = 8;
 export function pick(state: State, at: Point, resolution: number): Selection | null {
   return (
     (state.layers.robots.on ? pickRobot(state, at, ROBOT_PX * resolution) : null) ??
+    (state.layers.landmarks.on ? pickLandmark(state, at, LINE_PX * resolution) : null) ??
     (state.layers.chains.on ? pickCorner(state, at, LINE_PX * resolution) : null) ??
     (state.layers.segments.on ? pickSegment(state, at, LINE_PX * resolution) : null) ??
     (state.layers.clusters.on ? pickCluster(state, at, LINE_PX * resolution) : null) ??
@@ -27,6 +29,11 @@ function pickRobot(state: State, at: Point, withinM: number): Selection | null {
     })),
     { kind: "robot", withinM },
   );
+}
+
+function pickLandmark(state: State, at: Point, withinM: number): Selection | null {
+  const found = landmarkAt(state.model.landmarks.values(), at, withinM);
+  return found === null ? null : { kind: "landmark", id: found.id };
 }
 
 function pickSegment(state: State, at: Point, withinM: number): Selection | null {

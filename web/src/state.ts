@@ -7,6 +7,7 @@ import { withSlots } from "./palette";
 import type { Permalink, Place, View } from "./permalink";
 import type { Evidence } from "./pyramid";
 import { NO_IMPORTS, type ImportsState } from "./imports";
+import { NO_MODEL, type ModelState, type ModelView } from "./model";
 import { NO_LOG, type LogState } from "./reverts";
 import type {
   ContributionEntry,
@@ -36,7 +37,7 @@ export type Link =
 
 /** What the operator has chosen on the map. */
 export interface Selection {
-  kind: "segment" | "cluster" | "chain" | "robot";
+  kind: "segment" | "cluster" | "chain" | "landmark" | "robot";
   id: string;
 }
 
@@ -60,6 +61,7 @@ export interface State {
   contributions: readonly ContributionEntry[] | null;
   log: LogState;
   imports: ImportsState;
+  model: ModelState;
   link: Link;
   layers: Layers;
   evidence: Evidence;
@@ -86,6 +88,8 @@ export type Event =
   | { kind: "contributions"; contributions: readonly ContributionEntry[] }
   | { kind: "log"; log: Partial<LogState> }
   | { kind: "imports"; imports: Partial<ImportsState> }
+  | { kind: "model"; model: Partial<ModelState> }
+  | { kind: "model-view"; view: Partial<ModelView> }
   | { kind: "heard"; robots: readonly string[]; atMs: number }
   | { kind: "link"; link: Link }
   | { kind: "layer"; name: LayerName; setting: Partial<LayerSetting> }
@@ -118,6 +122,7 @@ const NO_LEVEL = {
 export function initialState(link: Permalink, nowMs: number): State {
   return {
     ...NO_LEVEL,
+    model: NO_MODEL,
     session: { kind: "asking" },
     sites: null,
     place: link.place,
@@ -136,14 +141,14 @@ export function update(state: State, event: Event): State {
   switch (event.kind) {
     case "session":
       return event.session.kind === "out"
-        ? { ...state, ...NO_LEVEL, sites: null, session: event.session }
+        ? { ...state, ...NO_LEVEL, model: NO_MODEL, sites: null, session: event.session }
         : { ...state, session: event.session };
     case "sites":
       return withSites(state, event.sites);
     case "place":
       return samePlace(state.place, event.place)
         ? state
-        : { ...state, ...NO_LEVEL, place: event.place, missing: null, view: { kind: "fit" } };
+        : { ...state, ...NO_LEVEL, model: { ...NO_MODEL, view: state.model.view }, place: event.place, missing: null, view: { kind: "fit" } };
     case "trouble":
       return { ...state, trouble: event.trouble };
     case "level":
@@ -171,6 +176,10 @@ export function update(state: State, event: Event): State {
       return { ...state, log: { ...state.log, ...event.log } };
     case "imports":
       return { ...state, imports: { ...state.imports, ...event.imports } };
+    case "model":
+      return forgetSelectionThatIsGone({ ...state, model: { ...state.model, ...event.model } });
+    case "model-view":
+      return { ...state, model: { ...state.model, view: { ...state.model.view, ...event.view } } };
     case "heard":
       return { ...state, heardAtMs: withHeard(state.heardAtMs, event.robots, event.atMs) };
     case "link":
@@ -233,11 +242,12 @@ function withHeard(
 }
 
 function forgetSelectionThatIsGone(state: State): State {
-  const { selection, content } = state;
+  const { selection, content, model } = state;
   const gone =
     (selection?.kind === "segment" && !content.segments.has(selection.id)) ||
     (selection?.kind === "cluster" && !content.clusters.has(selection.id)) ||
-    (selection?.kind === "chain" && !content.chains.has(selection.id));
+    (selection?.kind === "chain" && !content.chains.has(selection.id)) ||
+    (selection?.kind === "landmark" && !model.landmarks.has(selection.id));
   return gone ? { ...state, selection: null } : state;
 }
 

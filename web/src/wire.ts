@@ -48,6 +48,20 @@ export type RobotDescription = Exactly<Wire["RobotDescription"], { last_pose?: L
 export type ContributionEntry = Exactly<Wire["ContributionEntry"], { pose: [number, number, number] }>;
 export type ContributionPage = Exactly<Wire["ContributionPage"], { contributions: ContributionEntry[] }>;
 
+export type PlanCorner = Exactly<Wire["PlanCorner"], { at_m: [number, number] }>;
+export type PlanOpening = Exactly<
+  Wire["PlanOpening"],
+  { sides: Exactly<Wire["PlanOpeningSide"], { from_m: [number, number]; to_m: [number, number] }>[] }
+>;
+export type GdbPlan = Exactly<
+  Wire["GdbPlan"],
+  { outlines: PlanCorner[][]; sheets: PlanCorner[][]; openings: PlanOpening[] }
+>;
+export type GdbEntryPage = Wire["GdbEntryPage"];
+export type LandmarkKind = Wire["LandmarkKind"];
+export type Landmark = Exactly<Wire["Landmark"], { at_m: [number, number]; covariance: Matrix3 }>;
+export type LandmarkTable = Exactly<Wire["LandmarkTable"], { landmarks: Landmark[] }>;
+
 export type NewRevert = Wire["NewRevert"];
 export type Revert = Wire["Revert"];
 export type RevertPage = Wire["RevertPage"];

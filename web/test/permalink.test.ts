@@ -14,13 +14,13 @@ describe("a permalink", () => {
     };
     expect(parsePermalink(formatPermalink(link))).toEqual(link);
     expect(formatPermalink(link)).toBe(
-      "#site=plant-7&level=ground&x=-12.34&y=5.60&resolution=0.05&layers=raster:60,chains,segments,robots&evidence=sonar",
+      "#site=plant-7&level=ground&x=-12.34&y=5.60&resolution=0.05&layers=raster:60,model,chains,segments,robots&evidence=sonar",
     );
   });
 
   it("names no part of a level that is shown whole", () => {
     expect(formatPermalink({ ...NO_LINK, place: { site: "a", level: "b" } })).toBe(
-      "#site=a&level=b&layers=raster,clusters,chains,segments,robots",
+      "#site=a&level=b&layers=raster,model,clusters,chains,segments,robots",
     );
   });
 

@@ -39,6 +39,16 @@ export function paintSelection(frame: Frame, state: State, theme: Theme): void {
       pen.stroke();
       break;
     }
+    case "landmark": {
+      const landmark = state.model.landmarks.get(selection.id);
+      if (landmark === undefined) break;
+      const [x, y] = landmark.at_m;
+      pen.lineWidth = 4;
+      pen.beginPath();
+      pen.arc(xScreenFromLevel(frame, x), yScreenFromLevel(frame, y), 9, 0, 2 * Math.PI);
+      pen.stroke();
+      break;
+    }
     case "robot": {
       const pose = state.robots.find((robot) => robot.robot === selection.id)?.last_pose;
       if (pose == null) break;

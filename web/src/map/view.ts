@@ -12,6 +12,7 @@ import { boundsOf } from "../content";
 import { holds, shareOf, union, widened, type Box, type Point } from "../geometry";
 import { LAYER_NAMES, type LayerName } from "../layers";
 import { memo } from "../memo";
+import { boundsOfPlan } from "../model";
 import type { Theme } from "../palette";
 import { pick } from "../pick";
 import { pictureMarks, type PictureMark } from "../pyramid";
@@ -22,6 +23,8 @@ import type { Frame } from "./frame";
 import { paintChains } from "./paint_chains";
 import { paintClusters } from "./paint_clusters";
 import { paintGrid } from "./paint_grid";
+import { paintLandmarks } from "./paint_landmarks";
+import { paintModel } from "./paint_model";
 import { paintPreview } from "./paint_preview";
 import { paintRaster } from "./paint_raster";
 import { paintRobots } from "./paint_robots";
@@ -97,6 +100,7 @@ export function createMapView(options: MapViewOptions): MapView {
     batchesOf(segments.values(), slots),
   );
   const bounds = memo(boundsOf);
+  const planBounds = memo(boundsOfPlan);
 
   const painters: Record<LayerName, (frame: Frame) => void> = {
     raster: (frame) => {
@@ -107,6 +111,12 @@ export function createMapView(options: MapViewOptions): MapView {
     },
     grid: (frame) => {
       paintGrid(frame, theme());
+    },
+    model: (frame) => {
+      if (state.model.plan !== null) paintModel(frame, state.model.plan, theme());
+    },
+    landmarks: (frame) => {
+      paintLandmarks(frame, state.model.landmarks.values(), theme());
     },
     clusters: (frame) => {
       paintClusters(frame, state.content.clusters.values(), { slots: state.slots, theme: theme() });
@@ -149,7 +159,17 @@ export function createMapView(options: MapViewOptions): MapView {
     view,
     controls: [],
     interactions: defaultInteractions({ altShiftDragRotate: false, pinchRotate: false }),
-    layers: [layers.raster, layers.grid, layers.clusters, layers.chains, selectionLayer, layers.segments, layers.robots],
+    layers: [
+      layers.raster,
+      layers.grid,
+      layers.model,
+      layers.clusters,
+      layers.chains,
+      selectionLayer,
+      layers.segments,
+      layers.landmarks,
+      layers.robots,
+    ],
   });
 
   /** What the page itself has last set; anything else is the operator's doing. */
@@ -183,6 +203,8 @@ export function createMapView(options: MapViewOptions): MapView {
   const fit = (): void => {
     const tileM = tileEdgeM(state.level);
     let box = tileM === null ? null : bounds(state.content, tileM);
+    const planned = state.layers.model.on ? planBounds(state.model.plan) : null;
+    if (planned !== null) box = union(box, planned);
     for (const { last_pose: pose } of robotsHere(state)) {
       box = union(box, [pose.x_m, pose.y_m, pose.x_m, pose.y_m]);
     }
@@ -292,6 +314,7 @@ function drawnFrom(state: State): readonly unknown[] {
     state.log.preview,
     state.evidence,
     state.level,
+    state.model,
     state.nowMs,
   ];
 }

@@ -1,6 +1,7 @@
 // Which layers are shown, and how strongly.
 
-import { el, setShown } from "../dom";
+import { el, setShown, setText } from "../dom";
+import { HEIGHTS_M, MODEL_STATES, type ModelStateName } from "../model";
 import { LAYER_NAMES, LAYER_TITLES, type LayerName } from "../layers";
 import { EVIDENCE, type Evidence } from "../pyramid";
 import type { State } from "../state";
@@ -12,6 +13,8 @@ const TITLES: Readonly<Record<Evidence, string>> = {
   sonar: "sonar only",
   prior: "prior only",
 };
+
+const MODEL_TITLES: Readonly<Record<ModelStateName, string>> = { published: "as published", draft: "draft" };
 
 /** The shades of the server's pictures. */
 const SHADES = [
@@ -48,6 +51,8 @@ export function createLayersCard(parent: HTMLElement, store: Store): (state: Sta
     ),
   );
   rows.find(({ name }) => name === "raster")?.element.append(evidenceRow);
+  const modelRow = createModelRow(store);
+  rows.find(({ name }) => name === "model")?.element.append(modelRow.element);
   parent.append(
     el("section", { class: "card" }, el("h2", { text: "Layers" }), el("ul", { class: "layers" }, ...rows.map(({ element }) => element))),
   );
@@ -56,6 +61,59 @@ export function createLayersCard(parent: HTMLElement, store: Store): (state: Sta
     for (const { draw } of rows) draw(state);
     if (evidence.value !== state.evidence) evidence.value = state.evidence;
     setShown(evidenceRow, state.layers.raster.on);
+    modelRow.draw(state);
+  };
+}
+
+/** At which height the model is cut, and which one. */
+function createModelRow(store: Store): { element: HTMLElement; draw: (state: State) => void } {
+  const height = el("input", {
+    attrs: {
+      type: "number",
+      id: "model-height",
+      min: String(HEIGHTS_M.min),
+      max: String(HEIGHTS_M.max),
+      step: String(HEIGHTS_M.step),
+    },
+    on: {
+      change: () => {
+        if (height.validity.valid && height.value !== "") store.dispatch({ kind: "model-view", view: { heightM: height.valueAsNumber } });
+      },
+    },
+  });
+  const which = el(
+    "select",
+    {
+      attrs: { "aria-label": "Which model is shown" },
+      on: {
+        change: () => {
+          const chosen = MODEL_STATES.find((value) => value === which.value);
+          if (chosen !== undefined) store.dispatch({ kind: "model-view", view: { state: chosen } });
+        },
+      },
+    },
+    ...MODEL_STATES.map((value) => el("option", { text: MODEL_TITLES[value], attrs: { value } })),
+  );
+  const none = el("p", { class: "hint" });
+  const element = el(
+    "div",
+    { class: "layer-options" },
+    el("div", {}, el("label", { text: "cut at, m", attrs: { for: "model-height" } }), height),
+    el("div", {}, el("span", { text: "show" }), which),
+    none,
+  );
+  return {
+    element,
+    draw({ layers, model }) {
+      const { view, readAs, revision, plan, problem } = model;
+      if (document.activeElement !== height) height.value = String(view.heightM);
+      if (which.value !== view.state) which.value = view.state;
+      const nothing = revision === 0 ? "This level has no model yet." : plan === null ? "Nothing is published yet." : "";
+      const words = problem ?? (readAs === null ? "" : nothing);
+      setText(none, words);
+      setShown(none, words !== "");
+      setShown(element, layers.model.on && revision !== null);
+    },
   };
 }
 

@@ -3,9 +3,10 @@
 import { competenceInWords } from "../competence";
 import { angleSd, areaOf, edgesOf, ellipse95, leastExistence, lengthOf, middleOf, offsetSd } from "../geometry";
 import { el, setShown, setText } from "../dom";
+import { LANDMARK_WORDS } from "../model";
 import { isSilent, type State } from "../state";
 import type { Store } from "../store";
-import type { Chain, Cluster, EndKind, RobotDescription, Segment } from "../wire";
+import type { Chain, Cluster, EndKind, Landmark, RobotDescription, Segment } from "../wire";
 import { ago, coordinate, count, counted, degrees, fixed, instant, lengthInWords, likelihood, listed } from "../words";
 
 /** A card's title and its lines. */
@@ -36,6 +37,10 @@ export function describe(state: State): Description | null {
     case "chain": {
       const chain = content.chains.get(selection.id);
       return chain === undefined ? null : describeChain(chain, state);
+    }
+    case "landmark": {
+      const landmark = state.model.landmarks.get(selection.id);
+      return landmark === undefined ? null : describeLandmark(landmark);
     }
     case "robot": {
       const robot = state.robots.find((one) => one.robot === selection.id);
@@ -109,6 +114,23 @@ const AREA_WORDS: Readonly<Record<Chain["kind"], string>> = {
   obstacle: "free outside",
   room: "free inside",
 };
+
+function describeLandmark(landmark: Landmark): Description {
+  const [x, y] = landmark.at_m;
+  const [[xx, xy], [, yy], [, , hh]] = landmark.covariance;
+  const isCorner = landmark.kind === "convex_corner" || landmark.kind === "concave_corner";
+  return {
+    title: "Landmark",
+    lines: [
+      ["What", LANDMARK_WORDS[landmark.kind]],
+      ["Known from", landmark.source === "gdb" ? "the published model" : "what robots saw"],
+      ["Position", `x ${coordinate(x)}, y ${coordinate(y)}`],
+      ["Position", `95 % within ${lengthInWords(ellipse95(xx, xy, yy).majorM)}`],
+      ["Opens to", `${degrees(landmark.heading_rad)}, sd ${degrees(Math.sqrt(hh), 2)}`],
+      isCorner ? ["Free angle", degrees(landmark.extent)] : ["Width", lengthInWords(landmark.extent)],
+    ],
+  };
+}
 
 function describeCluster(cluster: Cluster, state: State): Description {
   const [[xx], [, yy]] = cluster.covariance;

@@ -255,13 +255,37 @@ describe("the operator", () => {
     await page.waitForFunction(() => !window.location.hash.includes("x=30.00"));
     await caughtUp();
     const address = page.url();
-    expect(address).toContain("layers=raster:40,chains,segments,robots&evidence=sonar");
+    expect(address).toContain("layers=raster:40,model,chains,segments,robots&evidence=sonar");
     await page.reload();
     await caughtUp();
     expect(page.url()).toBe(address);
     expect(await page.isChecked("#layer-clusters")).toBe(false);
     expect(await page.evaluate(() => document.querySelector<HTMLElement>(".painter-raster")?.style.opacity)).toBe("0.4");
     expect(mock.requests.at(-1)).not.toContain("layer=all");
+  });
+
+  it("shows the building as it was planned, at a height, from its publication on", async () => {
+    await open(IN_HALL);
+    await caughtUp();
+    expect(await page.textContent(".layers")).toContain("This level has no model yet.");
+    mock.model.enter("edit");
+    mock.step();
+    await page.waitForFunction(() => document.querySelector(".layers")?.textContent.includes("Nothing is published yet."));
+    mock.model.enter("publication");
+    mock.step();
+    await until("model", "0.3 26");
+    await caughtUp();
+    expect(await pixels("model", LIGHT.model)).toBeGreaterThan(100);
+
+    // Above its legs a table is a table.
+    await page.fill("#model-height", "0.75");
+    await page.keyboard.press("Enter");
+    await until("model", "0.75 14");
+
+    await page.check("#layer-landmarks");
+    await until("landmarks", 3);
+    await page.mouse.click(...(await at(29.45, 0)));
+    await page.waitForFunction(() => document.querySelector(".selection")?.textContent.includes("doorway"));
   });
 
   it("can do with the keyboard alone", async () => {

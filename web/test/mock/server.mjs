@@ -7,6 +7,7 @@ import { extname, join, normalize } from "node:path";
 import { fileURLToPath } from "node:url";
 import { createMockImports } from "./imports.mjs";
 import { createMockLevel } from "./level.mjs";
+import { createMockModel } from "./model.mjs";
 import { drawPicture } from "./picture.mjs";
 
 export const MOCK_TOKEN = "mock-token";
@@ -56,6 +57,7 @@ async function bodyOf(request) {
 export function createMockServer({ nowMs = Date.now, noSites = false } = {}) {
   const ground = createMockLevel({ nowMs });
   const prior = createMockImports({ nowMs });
+  const model = createMockModel({ nowMs });
   /** @type {Set<Response>} */
   const streams = new Set();
   /** Paths asked for, in order. @type {string[]} */
@@ -120,6 +122,12 @@ export function createMockServer({ nowMs = Date.now, noSites = false } = {}) {
       return removed === null ? problem(404, "There is no prior.") : json(removed);
     }
     if (rest === "/imports") return json({ imports: isGround ? prior.imports : [], next: null });
+    if (rest === "/gdb/entries") return json(isGround ? model.entries() : { entries: [], next: null });
+    if (rest === "/gdb/plan") {
+      const plan = model.plan(Number(url.searchParams.get("height_m")), url.searchParams.get("state") ?? "draft");
+      return plan === null ? problem(404, "Nothing is published yet.") : json(plan);
+    }
+    if (rest === "/landmarks") return json(model.landmarks(Number(url.searchParams.get("height_m"))));
     if (rest === "/events") {
       response.writeHead(200, { "content-type": "text/event-stream", "cache-control": "no-store" });
       response.write("retry: 3000\n\n");
@@ -167,6 +175,7 @@ export function createMockServer({ nowMs = Date.now, noSites = false } = {}) {
   return {
     ground,
     prior,
+    model,
     requests,
     /** @param {number} [port] @returns {Promise<string>} where the page is */
     listen: (port = 0) =>

@@ -1,0 +1,76 @@
+// What the page knows of the a-priori model (GDB): its plan at one height, and its landmarks. Pure.
+
+import { union, type Box, type Point } from "./geometry";
+import type { GdbPlan, Landmark, LandmarkKind } from "./wire";
+
+/** Which model is shown: what robots have, or what is being edited. */
+export const MODEL_STATES = ["published", "draft"] as const;
+
+export type ModelStateName = (typeof MODEL_STATES)[number];
+
+/** What is asked for. */
+export interface ModelView {
+  /** Height of the sensor above the floor, metres. */
+  heightM: number;
+  state: ModelStateName;
+}
+
+export interface ModelState {
+  view: ModelView;
+  /** The newest entry about the model that was read; 0 if there is none, null before anything was asked for. */
+  revision: number | null;
+  /** What the view was when it was read. */
+  readAs: ModelView | null;
+  /** Null if there is none. */
+  plan: GdbPlan | null;
+  /** Of what is published. */
+  landmarks: ReadonlyMap<string, Landmark>;
+  problem: string | null;
+}
+
+/** Before anything was asked for: the height of a table's legs. */
+export const NO_MODEL: ModelState = {
+  view: { heightM: 0.3, state: "published" },
+  revision: null,
+  readAs: null,
+  plan: null,
+  landmarks: new Map(),
+  problem: null,
+};
+
+/** Heights that can be asked for, metres. */
+export const HEIGHTS_M = { min: 0, max: 20, step: 0.05 } as const;
+
+/** Whether what was read is what is asked for, the newest entry being `revision`. */
+export function isRead(model: ModelState, revision: number): boolean {
+  return model.revision === revision && model.readAs === model.view;
+}
+
+/** The least box that holds a plan; null if nothing of the model is at its height. */
+export function boundsOfPlan(plan: GdbPlan | null): Box | null {
+  let box: Box | null = null;
+  for (const { at_m: [x, y] } of plan === null ? [] : [...plan.outlines, ...plan.sheets].flat()) {
+    box = union(box, [x, y, x, y]);
+  }
+  return box;
+}
+
+/** The landmark nearest to a place, if any is within `withinM`. */
+export function landmarkAt(landmarks: Iterable<Landmark>, at: Point, withinM: number): Landmark | null {
+  let best: Landmark | null = null;
+  let leastM = withinM;
+  for (const landmark of landmarks) {
+    const [x, y] = landmark.at_m;
+    const distanceM = Math.hypot(x - at[0], y - at[1]);
+    if (distanceM <= leastM) [best, leastM] = [landmark, distanceM];
+  }
+  return best;
+}
+
+/** Kinds of landmarks for people. */
+export const LANDMARK_WORDS: Readonly<Record<LandmarkKind, string>> = {
+  convex_corner: "corner that juts out",
+  concave_corner: "corner of a room",
+  wall_end: "free end of a wall",
+  doorway: "doorway",
+};

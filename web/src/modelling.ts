@@ -1,0 +1,80 @@
+// Follows the a-priori model: after the level has changed, asks whether its model has, and only then for
+// the plan and the landmarks.
+
+import { inWords, isAborted, Refused, type Api } from "./api";
+import { createCoalescer, type Timers } from "./coalesce";
+import { isRead, type ModelState } from "./model";
+import type { Place } from "./permalink";
+import { samePlace, type State } from "./state";
+import type { Dispatch } from "./store";
+
+/** Least time between two looks at the log of the model. */
+const INTERVAL_MS = 2_000;
+
+export interface ModelFollower {
+  /** The level has changed, or what is asked for. */
+  look: () => void;
+  stop: () => void;
+}
+
+export interface ModelFollowerOptions {
+  place: Place;
+  api: Api;
+  state: () => State;
+  dispatch: Dispatch;
+  timers: Timers;
+}
+
+export function followModel({ place, api, state, dispatch, timers }: ModelFollowerOptions): ModelFollower {
+  const abort = new AbortController();
+  const { signal } = abort;
+  const tell = (model: Partial<ModelState>): void => {
+    if (!signal.aborted && samePlace(place, state().place)) dispatch({ kind: "model", model });
+  };
+
+  const looking = createCoalescer({
+    intervalMs: INTERVAL_MS,
+    timers,
+    run: async () => {
+      try {
+        const newest = (await api.modelEntries(place, 1, signal)).entries.at(0)?.revision ?? 0;
+        const { view } = state().model;
+        if (isRead(state().model, newest)) return;
+        if (newest === 0) {
+          tell({ revision: 0, readAs: view, plan: null, landmarks: new Map(), problem: null });
+          return;
+        }
+        const [plan, table] = await Promise.all([unlessMissing(api.plan(place, view, signal)), api.landmarks(place, view.heightM, signal)]);
+        const landmarks = new Map(table.landmarks.map((landmark) => [landmark.id, landmark]));
+        tell({ revision: newest, readAs: view, plan, landmarks, problem: null });
+        // Another height may have been chosen meanwhile.
+        if (state().model.view !== view) looking.request();
+      } catch (error) {
+        // A server that is gone, or a session, is the business of whoever follows the map.
+        const isItsOwn = error instanceof Refused && error.status !== 401;
+        if (!isAborted(error) && isItsOwn) tell({ problem: inWords(error) });
+      }
+    },
+  });
+
+  return {
+    look: () => {
+      const { layers } = state();
+      if (layers.model.on || layers.landmarks.on) looking.request();
+    },
+    stop: () => {
+      abort.abort();
+      looking.stop();
+    },
+  };
+}
+
+/** The answer; null if there is nothing of that kind. */
+async function unlessMissing<T>(answer: Promise<T>): Promise<T | null> {
+  try {
+    return await answer;
+  } catch (error) {
+    if (error instanceof Refused && error.status === 404) return null;
+    throw error;
+  }
+}

@@ -1,0 +1,64 @@
+// A stand-in for the a-priori model of a level: a room with a doorway, and a table of which the legs or the top are
+// cut, as the height may be.
+
+/** @typedef {import("../../src/wire").GdbPlan} GdbPlan */
+/** @typedef {import("../../src/wire").LandmarkTable} LandmarkTable */
+/** @typedef {import("../../src/wire").GdbEntryPage} GdbEntryPage */
+
+/** @param {[number, number][]} corners @param {number} object */
+const ring = (corners, object) => corners.map((at_m) => ({ at_m, object }));
+
+/** A rectangle, clockwise. @param {number} x @param {number} y @param {number} wide @param {number} high @returns {[number, number][]} */
+const box = (x, y, wide, high) => [[x, y], [x, y + high], [x + wide, y + high], [x + wide, y]];
+
+const WALL = "019aa000-0000-7000-8000-000000000001";
+const TABLE = "019aa000-0000-7000-8000-000000000002";
+const DOOR = "019aa000-0000-7000-8000-000000000003";
+/** Height of the top of the table. */
+const TOP_M = 0.7;
+
+/** @param {{ nowMs: () => number }} options */
+export function createMockModel({ nowMs }) {
+  /** @type {GdbEntryPage["entries"]} */
+  const entries = [];
+
+  return {
+    /** Somebody edits or publishes. @param {"edit" | "publication"} kind */
+    enter(kind) {
+      const revision = 2000 + entries.length;
+      entries.unshift({
+        id: `entry-${revision}`, revision, kind, draft: 2000, library: 0, at: new Date(nowMs()).toISOString(), author: "mock", comment: "", put: 3, removed: 0,
+      });
+    },
+    /** @returns {GdbEntryPage} */
+    entries: () => ({ entries, next: null }),
+    /** Null if nothing is published. @param {number} heightM @param {string} state @returns {GdbPlan | null} */
+    plan(heightM, state) {
+      const isThere = state === "draft" ? entries.length > 0 : entries.some(({ kind }) => kind === "publication");
+      if (!isThere) return null;
+      const legs = [box(30, 2, 0.1, 0.1), box(31.9, 2, 0.1, 0.1), box(30, 2.9, 0.1, 0.1), box(31.9, 2.9, 0.1, 0.1)];
+      const table = heightM < TOP_M ? legs : [box(30, 2, 2, 1)];
+      return {
+        height_m: heightM, draft: 2000, library: 0,
+        objects: [
+          { id: WALL, kind: "wall", tolerance_m: 0.02, trust: 0.9 },
+          { id: TABLE, kind: "furniture", tolerance_m: 0.05, trust: 0.5 },
+        ],
+        outlines: [ring([...box(26, 0, 8, 5)].reverse(), 0), ring(box(25.8, -0.2, 8.4, 5.4), 0), ...table.map((leg) => ring(leg, 1))],
+        sheets: [ring([[28, 0], [28, 1.5]], 0)],
+        openings: [{ doorway: DOOR, width_m: 0.9, sides: [{ wall: WALL, from_m: [29, 0], to_m: [29.9, 0] }] }],
+      };
+    },
+    /** @param {number} heightM @returns {LandmarkTable} */
+    landmarks(heightM) {
+      const isThere = entries.some(({ kind }) => kind === "publication");
+      /** @type {LandmarkTable["landmarks"]} */
+      const landmarks = [
+        { id: "corner", kind: "concave_corner", source: "gdb", at_m: [26, 0], heading_rad: Math.PI / 4, covariance: [[4e-4, 0, 0], [0, 4e-4, 0], [0, 0, 1e-4]], extent: Math.PI / 2, objects: [WALL] },
+        { id: "end", kind: "wall_end", source: "gdb", at_m: [28, 1.5], heading_rad: Math.PI / 2, covariance: [[4e-4, 0, 0], [0, 4e-4, 0], [0, 0, 1e-4]], extent: 0.1, objects: [WALL] },
+        { id: "door", kind: "doorway", source: "gdb", at_m: [29.45, 0], heading_rad: Math.PI / 2, covariance: [[4e-4, 0, 0], [0, 4e-4, 0], [0, 0, 1e-4]], extent: 0.9, objects: [DOOR] },
+      ];
+      return { revision: 2000, publication: isThere ? 2001 : 0, height_m: heightM, landmarks: isThere ? landmarks : [], removed: [] };
+    },
+  };
+}
