@@ -5,7 +5,7 @@
 //! with covariance; [`breakpoints`] groups beams that may lie on one surface; [`split`] proposes
 //! lines by Iterative End Point Fit, confirms them by least squares (`cloud`, `guess`, `explain`),
 //! joins them, and settles which are walls (`settle`); [`fit`] is the weighted total least squares
-//! behind it; [`ends`] says where and what the ends of a wall are; [`seen_through`] says where beams
+//! behind it, [`hedge`] what it owes to points that may be another wall's; [`ends`] says where and what the ends of a wall are; [`seen_through`] says where beams
 //! went through its line beside it; [`clusters`] gathers what no line explains.
 //!
 //! Knows neither the robot's pose nor any map: results are in the robot frame and carry the
@@ -19,6 +19,7 @@ pub mod ends;
 mod explain;
 pub mod fit;
 mod guess;
+pub mod hedge;
 mod incidence;
 pub mod plausibility;
 pub mod points;
@@ -58,6 +59,8 @@ pub struct Config {
     pub split: split::SplitConfig,
     /// How a line is fitted.
     pub fit: fit::FitConfig,
+    /// What may stand beside walls.
+    pub hedge: hedge::HedgeConfig,
     /// What the ends of a wall are.
     pub ends: ends::EndsConfig,
     /// When a beam went through a wall's line.
@@ -75,6 +78,7 @@ impl Config {
             breakpoints: breakpoints::BreakpointConfig::default(),
             split: split::SplitConfig::default(),
             fit: fit::FitConfig::for_scanner(profile),
+            hedge: hedge::HedgeConfig::STANDARD,
             ends: ends::EndsConfig::default(),
             seen_through: seen_through::SeenThroughConfig::default(),
             clusters: clusters::ClusterConfig::for_scanner(profile),

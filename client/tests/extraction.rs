@@ -137,6 +137,25 @@ fn a_wall_across_the_seam_is_one_wall_where_the_scan_has_gaps() {
     }
 }
 
+#[test]
+fn noise_wider_than_a_near_wall_is_long_makes_no_walls_along_the_beams() {
+    // A corner half a metre off, read with a noise of 8 cm: from beam to beam points lie 2 mm apart along the
+    // walls and a hand's breadth along the beams.
+    let profile = ScannerProfile { range_sd_m: 0.08, range_sd_per_m: 0.0, ..profile() };
+    let config = Config::for_scanner(&profile);
+    let room = Room::polygon(&[(-0.4, -0.5), (0.5, -0.5), (0.5, 0.4), (-0.4, 0.4)]);
+    let mut chance = Chance(4);
+    let (mut walls, mut along) = (0, 0);
+    for _ in 0..200 {
+        let scan = room.scan((0.0, 0.0, 0.3), (721, 0.25 * DEGREE), (0.08, 0.0), &mut chance);
+        for wall in perception::extract(&scan, &config).segments {
+            walls += 1;
+            along += usize::from(wall.line.line.rho() < 0.15);
+        }
+    }
+    assert!(walls > 200 && along == 0, "{along} of {walls} walls lie along the beams");
+}
+
 /// A part of a test's world that gives segments, clusters and gaps.
 fn furnished() -> Room {
     let mut room = square();
@@ -233,8 +252,8 @@ fn line_parameters_are_as_uncertain_as_they_claim() {
     profile.systematic_sd_m = 0.0;
     profile.range_sd_per_m = 0.0;
     let mut config = Config::for_scanner(&profile);
-    // On a lone wall no other surface's points are to choose from.
-    config.fit.choice_factor = 1.0;
+    // Beside a lone wall nothing stands that its points could be.
+    config.hedge.foreign_share = 0.0;
     let (rho, alpha): (f64, f64) = (2.5, 0.6);
     let wall =
         [-1.0, 2.0].map(|t| unit_normal(alpha) * rho + tangent(alpha) * t).map(|p| (p.x, p.y));

@@ -3,6 +3,7 @@
 
 mod labelled;
 pub mod score;
+mod seeds;
 mod set;
 pub mod verdict;
 
@@ -42,7 +43,7 @@ pub fn times(mut one: impl FnMut(usize), mut other: impl FnMut(usize)) -> [f64; 
     sums.map(|sum| sum / SCANS as f64)
 }
 
-/// Rewrites the tables `extraction` and `lines` of the report, and `labelled` if there is a map with
+/// Rewrites the tables `extraction`, `lines` and `seeds` of the report, and `labelled` if there is a map with
 /// lines that people drew in `data`; answers what is not as it must be.
 ///
 /// # Errors
@@ -83,6 +84,9 @@ pub fn extraction(page: &Path, data: Option<&Path>) -> Result<Vec<String>, Error
     }
     report::rewrite(page, "extraction", &report::table(&HEADER, &rows))?;
     report::rewrite(page, "lines", &report::table(&HONESTY, &honesty))?;
+    let (seeds, bold) = seeds::rows();
+    report::rewrite(page, "seeds", &report::table(&seeds::HEADER, &seeds))?;
+    faults.extend(bold);
     let map = data.map(|data| data.join("plans/aria/columbia.map")).filter(|map| map.is_file());
     match map {
         Some(map) => faults.extend(labelled::labelled(page, &map)?),

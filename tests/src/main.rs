@@ -80,7 +80,7 @@ enum Command {
     },
     /// Finds lines in simulated scans of which every wall is known, beside a bare loop
     Extraction {
-        /// The page with the markers `extraction`, `lines` and `labelled`
+        /// The page with the markers `extraction`, `lines`, `seeds` and `labelled`
         #[arg(long, value_name = "FILE")]
         report: PathBuf,
         /// A folder with a map whose lines people drew, `plans/aria/columbia.map`

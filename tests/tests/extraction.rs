@@ -2,8 +2,10 @@
 //! of `mapfold-evaluate extraction` with fewer scans.
 
 use mapfold_tests::extraction::score::Score;
-use mapfold_tests::extraction::verdict::faults;
+use mapfold_tests::extraction::verdict::{faults, nees_band};
 use mapfold_tests::extraction::{FANS, Set};
+use mapfold_tests::simulation::Errors;
+use mapfold_tests::statistics::mean;
 
 /// Scans of each scanner; three scanners give more than a thousand lines of each noise.
 const SCANS: usize = 60;
@@ -34,6 +36,24 @@ fn lines_at_a_noise_of_3_cm_are_found_as_the_bare_loop_does_and_honest() {
 #[test]
 fn lines_at_a_noise_of_5_cm_are_found_as_the_bare_loop_does_and_honest() {
     hold_for_noise(0.05);
+}
+
+#[test]
+fn lines_at_a_noise_of_8_cm_claim_no_more_than_they_know() {
+    // As wide as door frames are deep, and far wider than from one point of a near wall to the next.
+    let errors = Errors { range_sd_m: 0.08, ..Errors::default() };
+    for fan in FANS {
+        let mut nees = Vec::new();
+        for seed in 0..3 {
+            let set = Set::drawn(String::new(), fan, &errors, 0, (2 * SCANS, seed));
+            nees.append(&mut set.scores()[0].nees);
+        }
+        assert!(nees.len() > 1000, "{} lines", nees.len());
+        assert!(mean(&nees) <= 2.0 + nees_band(&nees), "{} beams: {}", fan.beams, mean(&nees));
+        // No line runs along the beams, from nowhere to nowhere.
+        let worst = nees.iter().copied().fold(0.0, f64::max);
+        assert!(worst < 100.0, "{} beams: {worst}", fan.beams);
+    }
 }
 
 #[test]

@@ -38,7 +38,7 @@ impl Cloud {
         &'a self,
         stretch: &Range<usize>,
         stray: &'a [bool],
-    ) -> impl Iterator<Item = &'a ScanPoint> + Clone + use<'a> {
+    ) -> impl DoubleEndedIterator<Item = &'a ScanPoint> + Clone + use<'a> {
         let points = self.points[stretch.clone()].iter().zip(&stray[stretch.clone()]);
         points.filter_map(|(point, stray)| (!stray).then_some(point))
     }

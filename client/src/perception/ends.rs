@@ -237,11 +237,7 @@ mod tests {
                 ScanPoint::new(i as usize, p.norm(), p / p.norm(), &NOISE)
             })
             .collect();
-        fit_line(
-            points.iter(),
-            &FitConfig { systematic_sd: 0.005, linearity_min: 0.9, choice_factor: 1.0 },
-        )
-        .unwrap()
+        fit_line(points.iter(), &FitConfig { systematic_sd: 0.005, linearity_min: 0.9 }).unwrap()
     }
 
     #[test]

@@ -20,6 +20,7 @@ use mapfold_map::geometry::{Covariance, Point, Sensor, UncertainLine};
 use nalgebra::Matrix2;
 
 use super::guess::{Guess, Sums};
+use super::hedge::Doubt;
 use super::points::ScanPoint;
 use crate::sensor::ScannerProfile;
 
@@ -30,16 +31,12 @@ pub struct FitConfig {
     pub systematic_sd: f64,
     /// Smallest `Lambda / (S_xx + S_yy)` of a line: below, the points are a blob.
     pub linearity_min: f64,
-    /// By how much more than their noise alone makes it a line's variances are, for its points were
-    /// chosen by the very errors that they have: those of a corner or a door frame that happen to
-    /// lie on it are taken for its own. 1.15 keeps lines in simulated offices honest at any noise.
-    pub choice_factor: f64,
 }
 
 impl FitConfig {
     /// The settings that follow from a scanner's profile.
     pub fn for_scanner(profile: &ScannerProfile) -> Self {
-        Self { systematic_sd: profile.systematic_sd_m, linearity_min: 0.8, choice_factor: 1.15 }
+        Self { systematic_sd: profile.systematic_sd_m, linearity_min: 0.8 }
     }
 }
 
@@ -70,9 +67,9 @@ pub struct LineFit {
     /// Coordinates of the first and the last point along the line, the lesser first.
     pub span: (f64, f64),
     /// Sum of the points' weights, `1 / (n^T C n)`.
-    weight: f64,
+    pub(super) weight: f64,
     /// Second moment along the line about the middle, with these weights.
-    along: f64,
+    pub(super) along: f64,
     /// Coordinate of the middle along the line.
     middle: f64,
 }
@@ -96,6 +93,26 @@ impl LineFit {
         Self { span: (a.min(b), a.max(b)), ..self }
     }
 
+    /// The line moved and less certain by what is in doubt about it; as it is where that leaves none.
+    pub(super) fn moved(self, doubt: &Doubt) -> Self {
+        let ([offset, slope], tm) = (doubt.mean, self.middle);
+        let middle = self.normal * (self.line.line.rho() + offset) + self.tangent * tm;
+        let normal = (self.normal - self.tangent * slope) / (1.0 + slope * slope).sqrt();
+        let tangent = Point::new(-normal.y, normal.x);
+        let (rho, tc) = (normal.dot(&middle), tangent.dot(&middle));
+        let c = self.line.covariance.matrix();
+        // About the middle. A slope is a turn the other way.
+        let about_middle = [
+            c[(0, 0)] - tm * (2.0 * c[(0, 1)] - tm * c[(1, 1)]) + doubt.spread[0],
+            c[(0, 1)] - tm * c[(1, 1)] - doubt.spread[1],
+            c[(1, 1)] + doubt.spread[2],
+        ];
+        match line_about(about_middle, rho, &normal, tc) {
+            Some(line) if rho > 0.0 => Self { line, normal, tangent, middle: tc, ..self },
+            _ => self,
+        }
+    }
+
     /// Length of wall that the points cover.
     pub fn length(&self) -> f64 {
         self.span.1 - self.span.0
@@ -103,7 +120,7 @@ impl LineFit {
 
     /// Weight of a point, where its beam meets the line, from the middle of the line, and how far off
     /// it ended.
-    fn local(&self, point: &ScanPoint) -> (f64, f64, f64) {
+    pub(super) fn local(&self, point: &ScanPoint) -> (f64, f64, f64) {
         let d = point.at - self.tangent * self.middle;
         let e = self.normal.dot(&d) - self.line.line.rho();
         let (w, slip) = weight_and_slip(point, &self.normal, &self.tangent);
@@ -146,6 +163,11 @@ impl LineFit {
         let left = tttt - self.along * self.along / self.weight - ttt * ttt / self.along;
         let quarter = 0.25 * self.length() * self.length();
         (quarter * (tte / left).abs(), quarter / left.sqrt())
+    }
+
+    /// By how much more than their noise its points scatter, as a variance, at least 1.
+    pub(super) fn scatter(&self) -> f64 {
+        (self.chi_sq / (self.count - 2) as f64).max(1.0)
     }
 
     /// Root mean square of the normalised residuals.
@@ -216,13 +238,11 @@ where
     let floor = config.systematic_sd * config.systematic_sd + moments.shared / moments.count as f64;
     let chi_sq = (moments.ee - slope * moments.te).max(0.0);
     // Points that scatter more than their sensor should know the line no better than they do.
-    let scatter = config.choice_factor * (chi_sq / (moments.count - 2) as f64).max(1.0);
+    let scatter = (chi_sq / (moments.count - 2) as f64).max(1.0);
     let tilt = scatter / along + floor / (3.0 * half_length * half_length);
     let shift = scatter / moments.weight + floor;
-    let fitted = Matrix2::new(shift + tc * tc * tilt, tc * tilt, tc * tilt, tilt);
     // Points without extent give no finite matrix.
-    let covariance = Covariance::new(fitted).map_err(|_not_a_covariance| FitError::NotLinear)?;
-    let (line, _) = UncertainLine::normal_form(rho, normal.y.atan2(normal.x), covariance);
+    let line = line_about([shift, 0.0, tilt], rho, &normal, tc).ok_or(FitError::NotLinear)?;
     Ok(LineFit {
         line,
         normal,
@@ -234,6 +254,20 @@ where
         along,
         middle: tc,
     })
+}
+
+/// A line whose variance of the offset at `middle` along it, covariance with its angle and variance of that
+/// are these.
+fn line_about(
+    [offset, both, angle]: [f64; 3],
+    rho: f64,
+    normal: &Point,
+    middle: f64,
+) -> Option<UncertainLine<Sensor>> {
+    let cross = both + middle * angle;
+    let at_foot = offset + middle * (both + cross);
+    let covariance = Covariance::new(Matrix2::new(at_foot, cross, cross, angle)).ok()?;
+    Some(UncertainLine::normal_form(rho, normal.y.atan2(normal.x), covariance).0)
 }
 
 /// Most turns of the frame, and the slope in it from which on no more is needed, radians: the error
@@ -348,8 +382,7 @@ mod tests {
     use proptest::prelude::*;
     use std::f64::consts::PI;
 
-    const NO_FLOOR: FitConfig =
-        FitConfig { systematic_sd: 0.0, linearity_min: 0.9, choice_factor: 1.0 };
+    const NO_FLOOR: FitConfig = FitConfig { systematic_sd: 0.0, linearity_min: 0.9 };
     const NOISE: NoiseConfig =
         NoiseConfig { range_sd: 0.02, range_sd_per_metre: 0.002, bearing_sd: 0.003 };
 

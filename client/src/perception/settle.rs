@@ -43,12 +43,18 @@ impl Splitter {
             let first = fit.astray(own().take(looked_at), split.astray_sds);
             let last = fit.astray(own().rev().take(looked_at), split.astray_sds);
             if (first == 0 && last == 0) || trims_left == 0 {
-                let fit = fit.spanning(&cloud.at[points.start], &cloud.at[points.end - 1]);
-                let good = fit.length() >= split.length_min
+                let (from, to) = (&cloud.at[points.start], &cloud.at[points.end - 1]);
+                let spanning = fit.spanning(from, to);
+                let good = spanning.length() >= split.length_min
                     && fit.rms() <= split.rms_max
-                    && fit.line.covariance.matrix()[(1, 1)] <= split.direction_sd_max.powi(2)
-                    && !is_round(&fit, own(), split);
-                return good.then_some(FoundLine { points, fit });
+                    && is_direction_known(&fit, &cloud.points[clear.clone()], split)
+                    && !is_round(&spanning, own(), split);
+                if !good {
+                    return None;
+                }
+                let count = clear.len() - piece.strays;
+                let fit = fit.hedged(cloud.without(&clear, &self.stray), count, &config.hedge);
+                return Some(FoundLine { fit: fit.spanning(from, to), points });
             }
             clear = clear.start + first..clear.end - last;
             // What lies beyond what strays from the line does not return to it.
@@ -75,6 +81,45 @@ impl Splitter {
             return fit_from(&cloud.points[range.clone()].iter(), guess, &config.fit).ok();
         }
         fit_from(&cloud.without(range, &self.stray), guess, &config.fit).ok()
+    }
+}
+
+/// Whether the direction of a line is known: its deviation as fitted, and over all slopes across the beams that
+/// its points allow. What they know of the slope `dr / (r d angle)`, the tangent of the incidence, hangs on
+/// the turn of the beams and the noise of the ranges alone; what that comes to as an angle is the less,
+/// the more a line lies along the beams, so that noise which turns it there hides itself.
+fn is_direction_known(fit: &LineFit, points: &[ScanPoint], split: &SplitConfig) -> bool {
+    let max = split.direction_sd_max;
+    if fit.line.covariance.matrix()[(1, 1)] > max * max {
+        return false;
+    }
+    let count = points.len() as f64;
+    let (first, last) = (&points[0], &points[points.len() - 1]);
+    let turn_sq = (last.direction - first.direction).norm_squared();
+    // As if they were evenly spaced; most know it many times over, and need not be asked one by one.
+    if 48.0 * first.variance_along.max(last.variance_along)
+        <= count * turn_sq * first.range.min(last.range).powi(2) * max * max
+    {
+        return true;
+    }
+    // The regression of the ranges on the bearings, from the first beam.
+    let ahead = first.direction;
+    let (mut a, mut r, mut aa, mut ar, mut variance) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for point in points {
+        let angle = ahead.perp(&point.direction);
+        a += angle;
+        r += point.range;
+        aa += angle * angle;
+        ar += angle * point.range;
+        variance += point.variance_along;
+    }
+    let spread = aa - a * a / count;
+    let sd = (variance / spread).sqrt() / r * count.sqrt();
+    // An angle is never less certain than its tangent.
+    sd <= max || {
+        let slope = ((ar - a * r / count) / spread * count / r).abs();
+        let reach = split.direction_sds * sd;
+        (slope + reach).atan() - (slope - reach).atan() <= 2.0 * split.direction_sds * max
     }
 }
 

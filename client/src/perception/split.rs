@@ -5,7 +5,8 @@
 //! only proposes where to split; the run is split only if its least-squares line fails as well.
 //! All tests are normalised by each point's own deviation across the line, never a fixed width.
 //! A merge pass then joins neighbours that one line explains, points at the seams go to the
-//! closer line, and what is too short or too curved to be a wall is let go.
+//! closer line, and what its neighbours explain, or what is too short or too curved to be a wall, is let
+//! go.
 //!
 //! Until the last of these, lines are guesses from running sums, which cost the same for three
 //! points as for three hundred.
@@ -40,6 +41,9 @@ pub struct SplitConfig {
     pub length_min: f64,
     /// Largest standard deviation of a line's direction, radians: beyond, it is not known.
     pub direction_sd_max: f64,
+    /// Deviations of its slope across the beams over which that has to hold. A stretch that noise turned
+    /// towards the beams seems to know its direction well: of the many that are proposed, the worst is it.
+    pub direction_sds: f64,
     /// A line whose points bow by more than this share of its length, and more than so many standard
     /// deviations, is the side of something round.
     pub bow_max: f64,
@@ -88,6 +92,7 @@ impl Default for SplitConfig {
             points_min_fine: 8,
             length_min: 0.20,
             direction_sd_max: 8f64.to_radians(),
+            direction_sds: 4.0,
             bow_max: 0.03,
             bow_sds: 3.5,
             bow_length_max: 1.0,
@@ -179,6 +184,10 @@ impl Splitter {
             self.extend(cloud, run, config);
             self.merge(cloud, config);
             self.contest(cloud);
+            if self.dissolve(cloud, fewest, config) {
+                self.extend(cloud, run, config);
+                self.contest(cloud);
+            }
         }
         let mut free_from = run.start;
         for (i, piece) in self.pieces.iter().enumerate() {
@@ -346,6 +355,35 @@ impl Splitter {
                 b.guess = guess_without(cloud, &b.points, &self.stray, b.strays);
             }
         }
+    }
+
+    /// Lets go of every piece that its longer neighbours explain but for fewer points than make a
+    /// line: what seems to run from one surface to another along the beams is their noise, where that
+    /// is as wide as the step. Answers whether there was one.
+    fn dissolve(&mut self, cloud: &Cloud, fewest: usize, config: &Config) -> bool {
+        let near_sq = config.split.near_sds * config.split.near_sds;
+        let strays = config.split.stray_points;
+        let count = self.pieces.len();
+        let mut i = 0;
+        while i < self.pieces.len() {
+            let piece = &self.pieces[i];
+            let points = &piece.points;
+            let near = |other: &Piece, at: &usize| {
+                other.points.len() >= points.len()
+                    && other.guess.normalised_sq(&cloud.points[*at]) <= near_sq
+            };
+            let before = i.checked_sub(1).map(|i| &self.pieces[i]);
+            let before = before.filter(|b| b.points.end + strays >= points.start);
+            let after = self.pieces.get(i + 1).filter(|a| a.points.start <= points.end + strays);
+            let from = before.map_or(0, |b| points.clone().take_while(|at| near(b, at)).count());
+            let to = after.map_or(0, |a| points.clone().rev().take_while(|at| near(a, at)).count());
+            if points.len() < from + to + fewest {
+                self.pieces.remove(i);
+            } else {
+                i += 1;
+            }
+        }
+        self.pieces.len() < count
     }
 }
 

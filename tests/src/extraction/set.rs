@@ -57,7 +57,19 @@ impl Set {
     }
 
     fn of(name: String, fan: Fan, errors: &Errors, round_things: u32, scans: usize) -> Self {
-        let mut noise = Noise::of_seed(fan.beams as u64 + (errors.range_sd_m * 1e5) as u64);
+        let seed = fan.beams as u64 + (errors.range_sd_m * 1e5) as u64;
+        Self::drawn(name, fan, errors, round_things, (scans, seed))
+    }
+
+    /// Scans by a scanner with any errors, among so many round things, drawn from a seed.
+    pub fn drawn(
+        name: String,
+        fan: Fan,
+        errors: &Errors,
+        round_things: u32,
+        (scans, seed): (usize, u64),
+    ) -> Self {
+        let mut noise = Noise::of_seed(seed);
         let mut plans = Vec::new();
         let mut sweeps = Vec::new();
         for number in 0..scans {
