@@ -1,5 +1,6 @@
 //! The types of `/api/v1`. Metres, radians; instants are RFC 3339 in UTC; ids are UUIDs.
 
+mod building;
 mod contribution;
 mod event;
 mod features;
@@ -18,6 +19,7 @@ mod session;
 mod site;
 mod token;
 
+pub use building::{BuildingImport, BuildingReport};
 pub use contribution::{
     Contribution, ContributionEntry, ContributionPage, ContributionRecord, ContributionState,
     EvidencePatch, ObservedCluster, ObservedEnd, ObservedSegment, PoseEstimate, Provenance,
@@ -32,8 +34,8 @@ pub use gdb::{
     GdbPrototype, GdbSolid, ObjectKind,
 };
 pub use gdb_log::{
-    FindingSeverity, GdbAnswer, GdbEdit, GdbEntry, GdbEntryKind, GdbEntryPage, GdbFinding,
-    GdbFindings, GdbPreview,
+    FindingSeverity, GdbAnswer, GdbEdit, GdbEdited, GdbEntry, GdbEntryKind, GdbEntryPage,
+    GdbFinding, GdbFindings, GdbPreview,
 };
 pub use import::{Import, ImportPage, ImportReport};
 pub use jsonfg::{

@@ -5,6 +5,7 @@ mod args;
 mod backup;
 mod export;
 mod import;
+mod import_building;
 mod serve;
 mod token;
 mod verify;

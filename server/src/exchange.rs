@@ -4,10 +4,12 @@
 //! Equal maps give equal bytes: nothing here writes the time of day, an address or a version. GeoJSON,
 //! which mirrors write too, is in `mapfold_schema::geojson`.
 //!
+//! * [`building`]: a building of Open-RMF's traffic editor, in.
 //! * [`layers`]: which layers a raster has, and where they are found.
 //! * [`nav2`]: the raster as `map.yaml` and an image, out and in.
 //! * [`png_tiles`]: the raster as a picture pyramid.
 
+pub mod building;
 pub mod layers;
 pub mod nav2;
 pub mod png_tiles;

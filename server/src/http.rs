@@ -24,6 +24,7 @@ mod query;
 mod router;
 mod state;
 
+mod buildings;
 mod contributions;
 mod docs;
 mod drawing;

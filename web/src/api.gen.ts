@@ -319,6 +319,10 @@ export interface paths {
          *     obstacles win. The import is an entry of the level's log and takes the place of the one before.
          *     The same map with the same trust again changes nothing and is answered in the same way. With
          *     `preview=true` nothing is changed: the answer, of status 200, tells what was found.
+         *
+         *     A `building.yaml` of Open-RMF's traffic editor, as `application/yaml`, goes into the draft of the GDB instead: walls,
+         *     doorways and floors of one of its levels, and models that the site has prototypes of; the answer is a
+         *     `BuildingImport`. The same file gives the same objects. `If-Match` may name the draft that it is taken on.
          */
         post: operations["import"];
         /**
@@ -691,6 +695,50 @@ export interface components {
              */
             min_y_m: number;
         };
+        /** @description The answer to the import of a building: what was found, and what became of it. */
+        BuildingImport: {
+            answer?: components["schemas"]["GdbAnswer"] | null;
+            preview?: components["schemas"]["GdbPreview"] | null;
+            /** @description What was found. */
+            report: components["schemas"]["BuildingReport"];
+        };
+        /** @description What was found in a `building.yaml`, of one level. */
+        BuildingReport: {
+            bounds?: components["schemas"]["Bounds"] | null;
+            /** @description What the building is called. */
+            building: string;
+            /** @description The level that is taken. */
+            building_level: string;
+            /** @description All levels that it has. */
+            building_levels: string[];
+            /**
+             * Format: int32
+             * @description Doorways.
+             */
+            doorways: number;
+            /**
+             * Format: int32
+             * @description Floors.
+             */
+            floors: number;
+            /**
+             * Format: int32
+             * @description Models that became instances of prototypes of the same name.
+             */
+            instances: number;
+            /**
+             * Format: double
+             * @description Metres of one unit of the drawing.
+             */
+            scale_m: number;
+            /**
+             * Format: int32
+             * @description Walls, those over doors included.
+             */
+            walls: number;
+            /** @description What is doubtful about it, or was not taken, in words. */
+            warnings: string[];
+        };
         /**
          * @description Walls that meet at their ends, in the level frame, with free space on the left of whoever walks
          *     along them. Never meets itself.
@@ -1043,6 +1091,8 @@ export interface components {
             /** @description Objects that are no more. One that is not there is none. */
             remove?: string[];
         };
+        /** @description The answer to an edit that was made, or to one that was only asked about. */
+        GdbEdited: components["schemas"]["GdbPreview"] | components["schemas"]["GdbAnswer"];
         /** @description An entry of a level's log about its GDB. */
         GdbEntry: {
             /** @description When the server took it. */
@@ -3103,13 +3153,13 @@ export interface operations {
             };
         };
         responses: {
-            /** @description The draft is so */
+            /** @description The draft is so; or, for a preview, what would change */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["GdbPreview"];
+                    "application/json": components["schemas"]["GdbEdited"];
                 };
             };
             /** @description `gdb_moved_on`: others have changed it since; `errors` says what */
@@ -3171,13 +3221,13 @@ export interface operations {
             };
         };
         responses: {
-            /** @description The draft is so */
+            /** @description The draft is so; or, for a preview, what would change */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["GdbPreview"];
+                    "application/json": components["schemas"]["GdbEdited"];
                 };
             };
             /** @description `gdb_moved_on`: others have changed it since; `errors` says what */
@@ -3546,6 +3596,10 @@ export interface operations {
                  *     this, a free one -0.5 nat times this.
                  */
                 trust?: number;
+                /** @description Of a building: which of its levels; the only one if absent. */
+                building_level?: string;
+                /** @description Of a building, `true`: what is in the draft of the GDB and not in the building goes. */
+                replace?: boolean;
             };
             header?: never;
             path: {
@@ -3587,7 +3641,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description `invalid_map_package`, `invalid_map_metadata`, `invalid_map_data`: what is wrong, where, and what to do */
+            /** @description `invalid_map_package`, `invalid_map_metadata`, `invalid_map_data`, `invalid_building`: what is wrong, where, and what to do */
             422: {
                 headers: {
                     [name: string]: unknown;

@@ -93,6 +93,16 @@ pub struct GdbPreview {
     pub more_findings: bool,
 }
 
+/// The answer to an edit that was made, or to one that was only asked about.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(untagged)]
+pub enum GdbEdited {
+    /// What would change, for a preview.
+    Preview(GdbPreview),
+    /// It is so.
+    Answer(GdbAnswer),
+}
+
 /// How bad a finding is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]

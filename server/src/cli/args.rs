@@ -59,7 +59,7 @@ pub(super) enum Command {
     Token(TokenCommand),
     /// Write a level's map as a file of another program
     Export(ExportCommand),
-    /// Make a map of another program the prior of a level, below what robots saw
+    /// Make a map of another program the prior of a level, below what robots saw; or take a building into its model
     Import(ImportCommand),
     /// Refold the log and compare it with what is stored; fails if anything differs
     Verify(VerifyCommand),
@@ -141,7 +141,7 @@ pub(super) struct ExportCommand {
 
 #[derive(Debug, Args)]
 pub(super) struct ImportCommand {
-    /// The YAML of a `map_server` map, with its image beside it; or a zip of both
+    /// The YAML of a `map_server` map, with its image beside it; or a zip of both; or a `*.building.yaml` of Open-RMF
     pub(super) file: PathBuf,
     /// Slug of the site
     #[arg(long)]
@@ -152,6 +152,12 @@ pub(super) struct ImportCommand {
     /// How much the map is trusted, from 0 to 1 [default: 0.5]
     #[arg(long)]
     pub(super) trust: Option<f64>,
+    /// Of a building: which of its levels [default: the only one]
+    #[arg(long, value_name = "NAME")]
+    pub(super) building_level: Option<String>,
+    /// Of a building: take away what is in the draft and not in the building
+    #[arg(long)]
+    pub(super) replace: bool,
     /// Only tell what is in it
     #[arg(long)]
     pub(super) preview: bool,

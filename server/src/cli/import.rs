@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use mapfold_schema::v1::ImportReport;
 
 use super::args::ImportCommand;
-use super::{CommandError, say};
+use super::{CommandError, import_building, say};
 use crate::chance::Chance;
 use crate::clock::{Clock as _, SystemClock};
 use crate::config::Config;
@@ -17,12 +17,20 @@ use crate::running::{StartError, open_existing_store};
 use crate::store::imports::NewImport;
 
 /// Whom the log names as the author.
-const AUTHOR: &str = "command line";
+pub(super) const AUTHOR: &str = "command line";
 
 pub(super) async fn run(
     config: &Config,
     command: &ImportCommand,
 ) -> Result<ExitCode, CommandError> {
+    if is_building(&command.file) {
+        return import_building::run(config, command).await;
+    }
+    if command.building_level.is_some() || command.replace {
+        return Err(refused(
+            "--building-level and --replace are of buildings (*.building.yaml) only",
+        ));
+    }
     let trust = command.trust.map_or(Some(Trust::STANDARD), Trust::new);
     let trust = trust.ok_or_else(|| refused("--trust is from 0 to 1"))?;
     let package = read(&command.file)?;
@@ -51,7 +59,13 @@ pub(super) async fn run(
     Ok(ExitCode::SUCCESS)
 }
 
-fn refused(words: impl Into<String>) -> CommandError {
+fn is_building(path: &Path) -> bool {
+    let name = path.file_name().map(|name| name.to_string_lossy().to_ascii_lowercase());
+    let ends = [".building.yaml", ".building.yml"];
+    name.is_some_and(|name| ends.iter().any(|end| name.ends_with(end)))
+}
+
+pub(super) fn refused(words: impl Into<String>) -> CommandError {
     CommandError::Refused(words.into())
 }
 
@@ -74,7 +88,7 @@ fn read(path: &Path) -> Result<Package, CommandError> {
     Ok(Package { description, image: bytes_of(&image, IMAGE_BYTES_MAX)? })
 }
 
-fn bytes_of(path: &Path, most: usize) -> Result<Vec<u8>, CommandError> {
+pub(super) fn bytes_of(path: &Path, most: usize) -> Result<Vec<u8>, CommandError> {
     let what = || format!("cannot read {}", path.display());
     let length = std::fs::metadata(path).map(|metadata| metadata.len());
     let length = length.map_err(|cause| CommandError::File { what: what(), cause })?;

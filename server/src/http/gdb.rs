@@ -14,7 +14,8 @@ use mapfold_schema::border::gdb::{
 };
 use mapfold_schema::border::{VIOLATIONS_MAX, Violation};
 use mapfold_schema::v1::{
-    CollectionWord, GdbAnswer, GdbCollection, GdbEdit, GdbEntryPage, GdbPreview,
+    CollectionWord, GdbAnswer, GdbCollection, GdbEdit, GdbEdited, GdbEntry, GdbEntryPage,
+    GdbPreview,
 };
 use mapfold_schema::{codec, geojson, route};
 use serde::Deserialize;
@@ -173,7 +174,7 @@ fn collection(model: &GdbModel, frame: Uuid, with_place: bool) -> Result<Vec<u8>
     params(("site" = String, Path), ("level" = String, Path), EditQuery),
     request_body(content((GdbCollection = "application/geo+json"), (GdbCollection = "application/json"))),
     responses(
-        (status = 200, description = "The draft is so", content((GdbAnswer = "application/json"), (GdbPreview = "application/json"))),
+        (status = 200, body = GdbEdited, description = "The draft is so; or, for a preview, what would change"),
         (status = 412, description = "`gdb_moved_on`: others have changed it since; `errors` says what"),
         (status = 422, description = "`body_invalid` with `errors`; `gdb_too_large`"),
         (status = 428, description = "`precondition_required`: send `If-Match`"),
@@ -198,7 +199,7 @@ pub(super) async fn replace(
     params(("site" = String, Path), ("level" = String, Path), EditQuery),
     request_body = GdbEdit,
     responses(
-        (status = 200, description = "The draft is so", content((GdbAnswer = "application/json"), (GdbPreview = "application/json"))),
+        (status = 200, body = GdbEdited, description = "The draft is so; or, for a preview, what would change"),
         (status = 412, description = "`gdb_moved_on`: others have changed it since; `errors` says what"),
         (status = 422, description = "`body_invalid` with `errors`; `gdb_too_large`"),
         (status = 428, description = "`precondition_required`: send `If-Match`"),
@@ -217,13 +218,13 @@ pub(super) async fn edit(
 }
 
 /// What a body asks for.
-struct Asked {
+pub(super) struct Asked {
     /// The objects of the draft as they would be.
-    after: WireObjects,
+    pub(super) after: WireObjects,
     /// The change.
-    change: GdbChange,
+    pub(super) change: GdbChange,
     /// Where in the body each object stands.
-    named: BTreeMap<Uuid, String>,
+    pub(super) named: BTreeMap<Uuid, String>,
 }
 
 /// A body that asks for a change of the draft.
@@ -259,7 +260,7 @@ impl Asks for GdbEdit {
     }
 }
 
-fn columns(objects: &WireObjects) -> Result<BTreeMap<Uuid, Vec<u8>>, ApiError> {
+pub(super) fn columns(objects: &WireObjects) -> Result<BTreeMap<Uuid, Vec<u8>>, ApiError> {
     objects.iter().map(|(id, object)| Ok((*id, column(object)?))).collect()
 }
 
@@ -305,7 +306,8 @@ pub(super) fn decode<T: DeserializeOwned>(media_type: &str, bytes: &[u8]) -> Res
     decoded.map_err(ApiError::Body)
 }
 
-fn tell(draft: &GdbModel, after: &GdbModel) -> GdbPreview {
+/// What a change would come to.
+pub(super) fn tell(draft: &GdbModel, after: &GdbModel) -> GdbPreview {
     let (old, new) = (draft.objects(), after.objects());
     let changed = new.iter().filter(|(id, object)| old.get(*id).is_some_and(|o| o != *object));
     let findings = after.findings();
@@ -392,6 +394,21 @@ pub(super) fn new_entry(app: &App, author: &str, comment: &str, expected: Expect
     }
 }
 
+/// What is there after a change, and the entry if there is one.
+pub(super) fn concluded(
+    outcome: GdbOutcome,
+    named: BTreeMap<Uuid, String>,
+) -> Result<(GdbVersion, Option<GdbEntry>), ApiError> {
+    match outcome {
+        GdbOutcome::Done(entry) => {
+            Ok((GdbVersion { draft: entry.draft, library: entry.library }, Some(entry)))
+        }
+        GdbOutcome::Same(state) => Ok((state.draft, None)),
+        GdbOutcome::Stale(stale) => Err(GdbRefusal::Stale { stale, named }.into()),
+        GdbOutcome::TooMany { objects } => Err(GdbRefusal::TooMany { objects }.into()),
+    }
+}
+
 /// The answer to a change, with the tag of what is there now.
 fn answer(
     reader: &Reader,
@@ -399,14 +416,8 @@ fn answer(
     named: BTreeMap<Uuid, String>,
     done: StatusCode,
 ) -> Result<Response, ApiError> {
-    let (version, status, entry) = match outcome {
-        GdbOutcome::Done(entry) => {
-            (GdbVersion { draft: entry.draft, library: entry.library }, done, Some(entry))
-        }
-        GdbOutcome::Same(state) => (state.draft, StatusCode::OK, None),
-        GdbOutcome::Stale(stale) => return Err(GdbRefusal::Stale { stale, named }.into()),
-        GdbOutcome::TooMany { objects } => return Err(GdbRefusal::TooMany { objects }.into()),
-    };
+    let (version, entry) = concluded(outcome, named)?;
+    let status = if entry.is_some() { done } else { StatusCode::OK };
     let answer = GdbAnswer { draft: version.draft, library: version.library, entry };
     tagged(reader, status, &answer, &version_tag(version, ""))
 }

@@ -11,6 +11,7 @@ use serde::Deserialize;
 use super::access::{Edit, LevelFor, Read};
 use super::answer::{Reader, blocking, created};
 use super::body::{self, media_type};
+use super::buildings::{self, Taking, is_building};
 use super::exports::ZIP;
 use super::problem::ApiError;
 use super::query::{QueryOf, before, page_limit};
@@ -34,6 +35,11 @@ pub(super) struct ImportQuery {
     /// How much it is trusted, from 0 to 1; 0.5 if absent. An occupied cell says +4.0 nat times
     /// this, a free one -0.5 nat times this.
     trust: Option<f64>,
+    /// Of a building: which of its levels; the only one if absent.
+    building_level: Option<String>,
+    /// Of a building, `true`: what is in the draft of the GDB and not in the building goes.
+    #[serde(default)]
+    replace: bool,
 }
 
 /// Which imports are asked for.
@@ -58,6 +64,10 @@ pub(super) struct PageQuery {
 /// obstacles win. The import is an entry of the level's log and takes the place of the one before.
 /// The same map with the same trust again changes nothing and is answered in the same way. With
 /// `preview=true` nothing is changed: the answer, of status 200, tells what was found.
+///
+/// A `building.yaml` of Open-RMF's traffic editor, as `application/yaml`, goes into the draft of the GDB instead: walls,
+/// doorways and floors of one of its levels, and models that the site has prototypes of; the answer is a
+/// `BuildingImport`. The same file gives the same objects. `If-Match` may name the draft that it is taken on.
 #[utoipa::path(
     post, path = route::IMPORTS, operation_id = "import", tag = "map",
     params(("site" = String, Path), ("level" = String, Path), ImportQuery),
@@ -66,7 +76,7 @@ pub(super) struct PageQuery {
         (status = 200, body = ImportReport, description = "What was found, for a preview"),
         (status = 201, body = Import, description = "It is the prior"),
         (status = 413, description = "`payload_too_large`, `image_too_large`"),
-        (status = 422, description = "`invalid_map_package`, `invalid_map_metadata`, `invalid_map_data`: what is wrong, where, and what to do"),
+        (status = 422, description = "`invalid_map_package`, `invalid_map_metadata`, `invalid_map_data`, `invalid_building`: what is wrong, where, and what to do"),
     )
 )]
 pub(super) async fn create(
@@ -77,10 +87,19 @@ pub(super) async fn create(
     headers: HeaderMap,
     request: Request,
 ) -> Result<Response, ApiError> {
-    let ImportQuery { preview, trust } = query;
+    let ImportQuery { preview, trust, building_level, replace } = query;
     let trust = trust.map_or(Some(Trust::STANDARD), Trust::new);
     let trust = trust.ok_or_else(|| ApiError::Query("`trust` is from 0 to 1.".to_owned()))?;
     let sent = media_type(&headers).unwrap_or_default();
+    if is_building(&sent) {
+        let bytes = body::read(request, app.parts.limits.upload_bytes).await?;
+        let taking = Taking { preview, building_level, replace };
+        return buildings::take(&app, &level, taking, &reader, &headers, bytes).await;
+    }
+    if building_level.is_some() || replace {
+        let words = "`building_level` and `replace` are of buildings (`application/yaml`).";
+        return Err(ApiError::Query(words.to_owned()));
+    }
     if !sent.split(';').next().is_some_and(|essence| essence.trim().eq_ignore_ascii_case(ZIP)) {
         return Err(ApiError::NotZip);
     }

@@ -46,7 +46,7 @@ const TAGS_WITH_VALIDATORS: [&str; 6] =
         session::sign_in, session::describe, session::sign_out,
         health::live, health::ready, health::metrics,
     ),
-    components(schemas(Problem, v1::UploadAnswer)),
+    components(schemas(Problem, v1::UploadAnswer, v1::BuildingImport)),
     modifiers(&Common),
     security(("token" = []), ("session" = [])),
     tags(

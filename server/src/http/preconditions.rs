@@ -4,6 +4,7 @@
 //! (a coding, another form) does not matter here: the thing is the same.
 
 use axum::extract::FromRequestParts;
+use axum::http::HeaderMap;
 use axum::http::header::IF_MATCH;
 use axum::http::request::Parts;
 
@@ -19,13 +20,22 @@ impl<S: Send + Sync> FromRequestParts<S> for IfMatch {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, ApiError> {
-        let values = parts.headers.get_all(IF_MATCH).iter();
-        let texts: Vec<&str> = values.filter_map(|value| value.to_str().ok()).collect();
-        Ok(Self((!texts.is_empty()).then(|| texts.join(","))))
+        Ok(Self::of(&parts.headers))
     }
 }
 
 impl IfMatch {
+    pub(super) fn of(headers: &HeaderMap) -> Self {
+        let values = headers.get_all(IF_MATCH).iter();
+        let texts: Vec<&str> = values.filter_map(|value| value.to_str().ok()).collect();
+        Self((!texts.is_empty()).then(|| texts.join(",")))
+    }
+
+    /// Whether the client does not say.
+    pub(super) fn is_absent(&self) -> bool {
+        self.0.is_none()
+    }
+
     /// The versions of the GDB that may be there.
     pub(super) fn versions(&self) -> Result<Expected, ApiError> {
         let version = |(draft, library)| GdbVersion { draft, library };

@@ -12,6 +12,7 @@ use mapfold_schema::codec::{DecodeError, EncodeError};
 use mapfold_schema::problem::Problem;
 use mapfold_schema::v1::Scope;
 
+use crate::exchange::building::BuildingError;
 use crate::exchange::nav2::{ImportError, Nav2Error};
 use crate::level::{LevelError, RevertError, SinceError, SubmitError};
 use crate::store::StoreError;
@@ -50,6 +51,8 @@ pub(super) enum ApiError {
     BodyBroken,
     /// The body is no zip.
     NotZip,
+    /// A building of another program cannot be taken.
+    Building(BuildingError),
     /// A map of another program cannot be taken.
     Import(ImportError),
     /// The body is not of a known type, or cannot be read.
@@ -191,10 +194,12 @@ impl ApiError {
             Self::Level(LevelError::Closing) => Self::Closing.problem(),
             Self::Level(LevelError::Store(error)) | Self::Store(error) => of_store(error),
             Self::NotZip => {
-                let detail = "Send a zip of a YAML and its image, as `application/zip`.";
+                let detail = "Send a zip of a YAML and its image, as `application/zip`; or a building.yaml, as \
+                    `application/yaml`.";
                 of(415, "unsupported_media_type", detail)
             }
             Self::Import(error) => untaken(error),
+            Self::Building(error) => of(422, "invalid_building", sentence(&error.to_string())),
             Self::Nav2(error) => {
                 let code = match error {
                     Nav2Error::Empty | Nav2Error::EmptyBox => "map_empty",

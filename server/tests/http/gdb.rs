@@ -2,8 +2,9 @@
 
 use mapfold_schema::route;
 use mapfold_schema::v1::{
-    GdbAnswer, GdbCollection, GdbEntryKind, GdbEntryPage, GdbFindings, GdbPlan, GdbPreview, Import,
-    ImportReport, LandmarkKind, LandmarkTable, PrototypeCollection, RasterChanges, Scope,
+    BuildingImport, GdbAnswer, GdbCollection, GdbEntryKind, GdbEntryPage, GdbFindings, GdbPlan,
+    GdbPreview, Import, ImportReport, LandmarkKind, LandmarkTable, PrototypeCollection,
+    RasterChanges, Scope,
 };
 use reqwest::Method;
 use reqwest::header::{ACCEPT, IF_MATCH, IF_NONE_MATCH};
@@ -366,4 +367,72 @@ async fn editors_do_not_publish_and_readers_do_not_edit() {
     let authors: Vec<String> =
         entries.data::<GdbEntryPage>().entries.into_iter().map(|entry| entry.author).collect();
     assert_ne!(authors[0], authors[1]);
+}
+
+/// A room of 5 by 4 m at 100 pixels a metre, with a door in its upper wall.
+const BUILDING: &str = "
+name: hut
+levels:
+  L1:
+    vertices: [[0, 0, 0, ''], [200, 0, 0, ''], [300, 0, 0, ''], [500, 0, 0, ''], [500, 400, 0, ''], [0, 400, 0, '']]
+    walls: [[0, 1, {}], [2, 3, {}], [3, 4, {}], [4, 5, {}], [5, 0, {}]]
+    doors: [[1, 2, {name: [1, front], type: [1, sliding]}]]
+    measurements: [[0, 3, {distance: [3, 5.0]}]]
+    floors: [{vertices: [0, 3, 4, 5]}]
+";
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_building_is_previewed_taken_once_and_published() {
+    let server = Server::start().await;
+    let floor = Level::create(&server.admin()).await;
+    let post = async |query: &str, yaml: &str| {
+        let path = format!("{}{query}", floor.path(route::IMPORTS));
+        floor.client.post_bytes(&path, "application/yaml", yaml.to_owned()).await
+    };
+    let told: BuildingImport = post("?preview=true", BUILDING).await.expect(200).data();
+    let report = &told.report;
+    assert_eq!((report.walls, report.doorways, report.floors), (6, 1, 1));
+    let preview = told.preview.as_ref().unwrap();
+    assert_eq!((preview.new, preview.removed, preview.findings.len()), (8, 0, 0));
+    assert_eq!((floor.describe().await.revision, told.answer.is_none()), (0, true));
+
+    let made = post("?building_level=L1", BUILDING).await.expect(201);
+    assert_eq!(made.header("etag"), "\"1.0\"");
+    let made: BuildingImport = made.data();
+    assert_eq!((&made.report, made.answer.unwrap().draft), (report, 1));
+    let again: BuildingImport = post("", BUILDING).await.expect(200).data();
+    assert_eq!(again.answer.unwrap().entry, None);
+    publish(&floor, "\"1.0\"").await.expect(201);
+    let table = landmarks(&floor, "").await;
+    let count = |kind| table.landmarks.iter().filter(|landmark| landmark.kind == kind).count();
+    let counts = [LandmarkKind::ConcaveCorner, LandmarkKind::ConvexCorner, LandmarkKind::Doorway];
+    assert_eq!(counts.map(count), [4, 4, 1]);
+
+    // What is drawn by hand stays beside it, unless the building is to be all there is.
+    put_one(&floor, "\"1.0\"").await;
+    let kept: BuildingImport = post("?preview=true", BUILDING).await.expect(200).data();
+    assert_eq!(kept.preview.unwrap().removed, 0);
+    let alone: BuildingImport =
+        post("?preview=true&replace=true", BUILDING).await.expect(200).data();
+    assert_eq!(alone.preview.unwrap().removed, 1);
+
+    for (yaml, words) in [
+        (BUILDING.replace("[5, 0, {}]", "[6, 0, {}]"), "ine 6, column"),
+        (BUILDING.replace("distance: [3, 5.0]", "distance: [3, 1e300]"), "cannot be taken"),
+        (BUILDING.replace("measurements", "other"), "no measurement"),
+        ("[[[[[[".repeat(1000), "ine 1"),
+        ("a: &a [1]\nlevels: *a".to_owned(), "references"),
+        (String::new(), "ine 1"),
+    ] {
+        let problem = post("", &yaml).await.problem(422);
+        assert_eq!(problem.code, "invalid_building");
+        assert!(problem.detail.contains(words), "{}", problem.detail);
+    }
+    assert_eq!(post("?building_level=L2", BUILDING).await.code(422), "invalid_building");
+    assert_eq!(floor.describe().await.revision, 3);
+}
+
+async fn put_one(floor: &Level, tag: &str) {
+    let edit = json!({"put": [feature(9, "other", [2.0, -2.0, 0.5, 0.5], 3.0)]});
+    patch(floor, tag, &edit).await.expect(200);
 }
