@@ -6,7 +6,9 @@ import type { Place } from "./permalink";
 import type { Evidence, PictureAddress } from "./pyramid";
 import type {
   ContributionPage,
+  GdbAnswer,
   GdbEntryPage,
+  GdbFindings,
   GdbPlan,
   Import,
   ImportPage,
@@ -84,6 +86,10 @@ export interface Api {
   removePrior: (place: Place) => Promise<Import>;
   /** The newest edits and publications of the a-priori model. */
   modelEntries: (place: Place, limit: number, signal: AbortSignal) => Promise<GdbEntryPage>;
+  /** What is wrong with the draft. */
+  findings: (place: Place, signal: AbortSignal) => Promise<GdbFindings>;
+  /** Hands a draft with a library to the robots: that very one, or it is refused. */
+  publishModel: (place: Place, version: { draft: number; library: number }) => Promise<GdbAnswer>;
   /** What a sensor at a height would see of it. */
   plan: (place: Place, view: ModelView, signal: AbortSignal) => Promise<GdbPlan>;
   /** Its landmarks at a height, as it is published. */
@@ -202,6 +208,9 @@ export function createApi(browser: Browser): Api {
     importPrior: (place, map, trust) => askJson(`${levelPath(place)}/imports?trust=${trust}`, zip(map)),
     removePrior: (place) => askJson(`${levelPath(place)}/imports`, { method: "DELETE" }),
     modelEntries: (place, limit, signal) => askJson(`${levelPath(place)}/gdb/entries?limit=${limit}`, { signal }),
+    findings: (place, signal) => askJson(`${levelPath(place)}/gdb/findings`, { signal }),
+    publishModel: (place, { draft, library }) =>
+      askJson(`${levelPath(place)}/gdb/publications`, { method: "POST", headers: { "if-match": `"${draft}.${library}"` } }),
     plan: (place, { heightM, state }, signal) =>
       askJson(`${levelPath(place)}/gdb/plan?height_m=${heightM}&state=${state}`, { signal }),
     landmarks: (place, heightM, signal) => askJson(`${levelPath(place)}/landmarks?height_m=${heightM}`, { signal }),

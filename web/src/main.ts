@@ -3,6 +3,7 @@
 
 import { createApi } from "./api";
 import { setShown } from "./dom";
+import { createDraftActions } from "./drafting";
 import { createFacts } from "./facts";
 import { followLevel } from "./feed";
 import { createImportActions } from "./importing";
@@ -16,6 +17,7 @@ import { createLevelCard } from "./panels/level_card";
 import { createLogPanel } from "./panels/log_panel";
 import { createMapTools, ZOOM_STEP } from "./panels/map_tools";
 import { createMessages } from "./panels/messages";
+import { createModelCard } from "./panels/model_card";
 import { createPriorCard } from "./panels/prior_card";
 import { createRobotsCard } from "./panels/robots_card";
 import { createSelectionCard } from "./panels/selection_card";
@@ -75,11 +77,13 @@ const panels = byId("panels");
 const overMap = byId("over-map");
 const log = createLogActions({ api, state: store.state, dispatch, uuid: () => uuidFrom(crypto.getRandomValues(new Uint8Array(16))) });
 const prior = createImportActions({ api, state: store.state, dispatch });
+const draft = createDraftActions({ api, state: store.state, dispatch });
 const draws = [
   createHeader({ parent: byId("header"), store, onSignOut: () => void signOut(api, dispatch) }),
   createLevelCard(panels),
   createRobotsCard(panels, { store, theme }),
   createLayersCard(panels, store),
+  createModelCard(panels, { store, actions: draft }),
   createPriorCard(panels, prior),
   createContributionsCard(panels, { store, theme, onOpenLog: log.open }),
   createLogPanel({ parent: page, store, theme, actions: log }),
@@ -131,6 +135,8 @@ store.onChange((state, before) => {
   if (state.log.open && before.contributions !== state.contributions) log.refresh();
   const isAnotherModel = before.model.view !== state.model.view || before.level?.revision !== state.level?.revision;
   if (isAnotherModel || before.layers !== state.layers) model?.look();
+  // What follows the model has just found that it is another.
+  if (before.model.revision !== state.model.revision) draft.refresh();
   if (state.imports.open && before.level !== state.level) prior.refresh();
 });
 store.onChange((state) => {

@@ -44,7 +44,9 @@ export function followModel({ place, api, state, dispatch, timers }: ModelFollow
           tell({ revision: 0, readAs: view, plan: null, landmarks: new Map(), problem: null });
           return;
         }
-        const [plan, table] = await Promise.all([unlessMissing(api.plan(place, view, signal)), api.landmarks(place, view.heightM, signal)]);
+        const table = await api.landmarks(place, view.heightM, signal);
+        const isThere = view.state === "draft" || table.publication > 0;
+        const plan = isThere ? await api.plan(place, view, signal) : null;
         const landmarks = new Map(table.landmarks.map((landmark) => [landmark.id, landmark]));
         tell({ revision: newest, readAs: view, plan, landmarks, problem: null });
         // Another height may have been chosen meanwhile.
@@ -59,22 +61,12 @@ export function followModel({ place, api, state, dispatch, timers }: ModelFollow
 
   return {
     look: () => {
-      const { layers } = state();
-      if (layers.model.on || layers.landmarks.on) looking.request();
+      const { layers, draft } = state();
+      if (layers.model.on || layers.landmarks.on || draft.open) looking.request();
     },
     stop: () => {
       abort.abort();
       looking.stop();
     },
   };
-}
-
-/** The answer; null if there is nothing of that kind. */
-async function unlessMissing<T>(answer: Promise<T>): Promise<T | null> {
-  try {
-    return await answer;
-  } catch (error) {
-    if (error instanceof Refused && error.status === 404) return null;
-    throw error;
-  }
 }

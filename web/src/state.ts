@@ -6,6 +6,7 @@ import type { LayerName, Layers, LayerSetting } from "./layers";
 import { withSlots } from "./palette";
 import type { Permalink, Place, View } from "./permalink";
 import type { Evidence } from "./pyramid";
+import { NO_DRAFT, type DraftState } from "./drafts";
 import { NO_IMPORTS, type ImportsState } from "./imports";
 import { NO_MODEL, type ModelState, type ModelView } from "./model";
 import { NO_LOG, type LogState } from "./reverts";
@@ -62,6 +63,7 @@ export interface State {
   log: LogState;
   imports: ImportsState;
   model: ModelState;
+  draft: DraftState;
   link: Link;
   layers: Layers;
   evidence: Evidence;
@@ -88,6 +90,7 @@ export type Event =
   | { kind: "contributions"; contributions: readonly ContributionEntry[] }
   | { kind: "log"; log: Partial<LogState> }
   | { kind: "imports"; imports: Partial<ImportsState> }
+  | { kind: "draft"; draft: Partial<DraftState> }
   | { kind: "model"; model: Partial<ModelState> }
   | { kind: "model-view"; view: Partial<ModelView> }
   | { kind: "heard"; robots: readonly string[]; atMs: number }
@@ -113,6 +116,7 @@ const NO_LEVEL = {
   contributions: null,
   log: NO_LOG,
   imports: NO_IMPORTS,
+  draft: NO_DRAFT,
   link: { kind: "idle" },
   selection: null,
   pointer: null,
@@ -176,6 +180,8 @@ export function update(state: State, event: Event): State {
       return { ...state, log: { ...state.log, ...event.log } };
     case "imports":
       return { ...state, imports: { ...state.imports, ...event.imports } };
+    case "draft":
+      return { ...state, draft: { ...state.draft, ...event.draft } };
     case "model":
       return forgetSelectionThatIsGone({ ...state, model: { ...state.model, ...event.model } });
     case "model-view":

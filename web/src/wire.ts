@@ -57,7 +57,11 @@ export type GdbPlan = Exactly<
   Wire["GdbPlan"],
   { outlines: PlanCorner[][]; sheets: PlanCorner[][]; openings: PlanOpening[] }
 >;
+export type GdbEntry = Wire["GdbEntry"];
 export type GdbEntryPage = Wire["GdbEntryPage"];
+export type GdbFinding = Exactly<Wire["GdbFinding"], { at_m?: [number, number, number] | null }>;
+export type GdbFindings = Exactly<Wire["GdbFindings"], { findings: GdbFinding[] }>;
+export type GdbAnswer = Wire["GdbAnswer"];
 export type LandmarkKind = Wire["LandmarkKind"];
 export type Landmark = Exactly<Wire["Landmark"], { at_m: [number, number]; covariance: Matrix3 }>;
 export type LandmarkTable = Exactly<Wire["LandmarkTable"], { landmarks: Landmark[] }>;

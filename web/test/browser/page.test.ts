@@ -288,6 +288,36 @@ describe("the operator", () => {
     await page.waitForFunction(() => document.querySelector(".selection")?.textContent.includes("doorway"));
   });
 
+  it("publishes the draft that it has read, and no other", async () => {
+    await open(IN_HALL);
+    await caughtUp();
+    await page.click(".model-card summary");
+    await page.waitForFunction(() => document.querySelector(".model-now")?.textContent === "This level has no model yet.");
+    mock.model.enter("edit");
+    mock.model.wrong = [{ severity: "error", code: "outside_wall", detail: "The doorway lies outside of its wall.", other: "wall", at_m: [28, 1.5, 0] }];
+    mock.step();
+    await page.waitForFunction(() => document.querySelector(".model-now")?.textContent.includes("has errors"));
+    expect(await page.isDisabled("#model-publish")).toBe(true);
+    await page.click(".findings .show");
+    await page.waitForFunction(() => window.location.hash.includes("x=28.00&y=1.50"));
+
+    mock.model.wrong = [];
+    mock.model.enter("edit");
+    mock.step();
+    await page.waitForFunction(() => document.querySelector(".model-now")?.textContent.includes("another than what robots have"));
+    // Somebody else edits; the page has not heard of it when the button is pressed.
+    mock.model.enter("edit");
+    await page.click("#model-publish");
+    await page.waitForFunction(() => document.querySelector(".model-card .problem")?.textContent.includes("moved on"));
+    complaints = complaints.filter((text) => !text.includes("412"));
+    // By then it has read the new draft.
+    await page.waitForFunction(() => document.querySelectorAll(".model-card .imports li").length === 3);
+    await page.click("#model-publish");
+    await page.waitForFunction(() => document.querySelector(".model-card .done")?.textContent.includes("Published"));
+    await page.waitForFunction(() => document.querySelector(".model-now")?.textContent === "Robots have the draft as it is.");
+    expect(complaints).toEqual([]);
+  });
+
   it("can do with the keyboard alone", async () => {
     await open(IN_HALL);
     await caughtUp();
@@ -326,13 +356,13 @@ describe("the operator", () => {
     await choose("image: floor.pgm\nresolution: fine\n");
     await page.click("#prior-preview");
     await page.waitForSelector(".prior-card .problem:has-text('line 2, column 13')");
-    expect(await page.isVisible("#prior-confirm")).toBe(false);
+    await page.waitForSelector("#prior-confirm", { state: "hidden" });
 
     await choose("image: floor.pgm\nresolution: 0.05\n");
     await page.fill("#prior-trust", "0.8");
     await page.click("#prior-preview");
     await page.waitForSelector(".prior-told");
-    expect(await page.isVisible(".prior-card .problem")).toBe(false);
+    await page.waitForSelector(".prior-card .problem", { state: "hidden" });
     const told = await page.innerText(".prior-told");
     for (const words of ["floor.pgm, 40 × 20 pixels", "5 cm a pixel", "x -1.50 m, y 2.25 m", "trinary", "0.65", "0.196", "0.8"]) {
       expect(told).toContain(words);
@@ -342,7 +372,7 @@ describe("the operator", () => {
 
     // Another trust is another question.
     await page.fill("#prior-trust", "0.7");
-    expect(await page.isVisible("#prior-confirm")).toBe(false);
+    await page.waitForSelector("#prior-confirm", { state: "hidden" });
     await page.click("#prior-preview");
     await page.click("#prior-confirm");
     await page.waitForSelector(".prior-card .done:has-text('It is the prior')");
@@ -352,7 +382,7 @@ describe("the operator", () => {
     await page.click("#prior-remove");
     await page.waitForSelector(".imports li:has-text('Prior taken away')");
     await page.waitForSelector("text=There is none.");
-    expect(await page.isVisible("#prior-remove")).toBe(false);
+    await page.waitForSelector("#prior-remove", { state: "hidden" });
     // A refusal that was asked for is a line of the console; there is no other.
     expect(complaints.filter((text) => !text.includes("422"))).toEqual([]);
     expect(strays).toEqual([]);

@@ -4,6 +4,7 @@
 /** @typedef {import("../../src/wire").GdbPlan} GdbPlan */
 /** @typedef {import("../../src/wire").LandmarkTable} LandmarkTable */
 /** @typedef {import("../../src/wire").GdbEntryPage} GdbEntryPage */
+/** @typedef {import("../../src/wire").GdbFindings} GdbFindings */
 
 /** @param {[number, number][]} corners @param {number} object */
 const ring = (corners, object) => corners.map((at_m) => ({ at_m, object }));
@@ -21,14 +22,28 @@ const TOP_M = 0.7;
 export function createMockModel({ nowMs }) {
   /** @type {GdbEntryPage["entries"]} */
   const entries = [];
+  /** The draft: the newest edit. */
+  const draft = () => entries.find(({ kind }) => kind === "edit")?.revision ?? 0;
 
   return {
     /** Somebody edits or publishes. @param {"edit" | "publication"} kind */
     enter(kind) {
       const revision = 2000 + entries.length;
-      entries.unshift({
-        id: `entry-${revision}`, revision, kind, draft: 2000, library: 0, at: new Date(nowMs()).toISOString(), author: "mock", comment: "", put: 3, removed: 0,
-      });
+      const made = {
+        id: `entry-${revision}`, revision, kind, draft: kind === "edit" ? revision : draft(), library: 0, at: new Date(nowMs()).toISOString(), author: "mock", comment: "", put: 3, removed: 0,
+      };
+      entries.unshift(made);
+      return made;
+    },
+    /** What is wrong with the draft. @type {GdbFindings["findings"]} */
+    wrong: [],
+    /** @returns {GdbFindings} */
+    findings() {
+      return { draft: draft(), library: 0, findings: this.wrong };
+    },
+    /** Null if it is another draft by now. @param {string} tag */
+    publish(tag) {
+      return tag === `"${draft()}.0"` ? { draft: draft(), library: 0, entry: this.enter("publication") } : null;
     },
     /** @returns {GdbEntryPage} */
     entries: () => ({ entries, next: null }),

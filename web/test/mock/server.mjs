@@ -123,6 +123,11 @@ export function createMockServer({ nowMs = Date.now, noSites = false } = {}) {
     }
     if (rest === "/imports") return json({ imports: isGround ? prior.imports : [], next: null });
     if (rest === "/gdb/entries") return json(isGround ? model.entries() : { entries: [], next: null });
+    if (rest === "/gdb/findings") return json(model.findings());
+    if (rest === "/gdb/publications") {
+      const answer = model.publish(request.headers["if-match"] ?? "");
+      return answer === null ? problem(412, "The draft has moved on: ada changed 3 objects since.") : json(answer);
+    }
     if (rest === "/gdb/plan") {
       const plan = model.plan(Number(url.searchParams.get("height_m")), url.searchParams.get("state") ?? "draft");
       return plan === null ? problem(404, "Nothing is published yet.") : json(plan);
