@@ -214,7 +214,8 @@ async fn lists(
 
 /// Whether the server has no level's pictures left to draw in the background.
 async fn is_drawn(api: &Api) -> Result<bool, Error> {
-    let figures = api.get("/metrics", "*/*").await?.expect(200)?.text();
+    let figures = api.get("/metrics", "*/*").await?.expect(200)?.body;
+    let figures = String::from_utf8_lossy(&figures);
     let left = figures.lines().find_map(|line| line.strip_prefix("mapfold_levels_to_draw "));
     Ok(left.and_then(|left| left.parse().ok()) == Some(0.0))
 }
