@@ -43,7 +43,9 @@ pub use jsonfg::{
     PrototypeFeature,
 };
 pub use level::{Bounds, Counts, LevelDescription, NewLevel};
-pub use patch::{Patch, RasterChanges, Removed, TileAddress, TileEvidence, TilePlace, VectorPatch};
+pub use patch::{
+    Patch, PriorTile, RasterChanges, Removed, TileAddress, TileEvidence, TilePlace, VectorPatch,
+};
 pub use plan::{
     GdbPlan, Landmark, LandmarkKind, LandmarkSource, LandmarkTable, PlanCorner, PlanObject,
     PlanOpening, PlanOpeningSide,

@@ -189,25 +189,29 @@ fn key() -> impl Strategy<Value = TileKey> {
 }
 
 fn patch() -> impl Strategy<Value = Patch> {
-    let tile = cells(any::<i32>()).prop_map(|cells| Arc::new(Tile::new(cells)));
+    let tile = || cells(any::<i32>()).prop_map(|cells| Arc::new(Tile::new(cells)));
     (
         btree_map(feature(), segment().prop_map(Arc::new), 0..3),
         btree_map(feature(), cluster().prop_map(Arc::new), 0..3),
         btree_map(chain_key(), chain().prop_map(Arc::new), 0..3),
-        btree_map(key(), tile, 0..3),
+        btree_map(key(), tile(), 0..3),
+        (btree_map(key().prop_map(|key| key.tile), tile(), 0..3), vec(key(), 0..3)),
         (vec(feature(), 0..3), vec(feature(), 0..3), vec(chain_key(), 0..3), vec(key(), 0..3)),
     )
-        .prop_map(|(segments, clusters, chains, tiles, removed)| {
+        .prop_map(|(segments, clusters, chains, tiles, (prior, gone), removed)| {
             let (removed_segments, removed_clusters, removed_chains, removed_tiles) = removed;
+            let removed_prior = gone.into_iter().map(|key| key.tile).collect();
             Patch {
                 segments,
                 clusters,
                 chains,
                 tiles,
+                prior,
                 removed_segments,
                 removed_clusters,
                 removed_chains,
                 removed_tiles,
+                removed_prior,
             }
         })
 }
@@ -520,6 +524,7 @@ fn a_patch_names_the_places_of_its_faults() {
             tile(vec![4, 1, 0]),
             v1::TileEvidence { x: i32::MIN, ..tile(vec![]) },
         ],
+        prior: vec![v1::PriorTile { x: 0, y: 0, runs: vec![4095, 2, 5] }],
         removed: v1::Removed { segments: vec!["x".to_owned()], ..v1::Removed::default() },
     };
     let said: Vec<(String, String)> = map_patch(&patch)
@@ -535,6 +540,7 @@ fn a_patch_names_the_places_of_its_faults() {
         ("bad_run", "/tiles/4/runs/3"),
         ("bad_run", "/tiles/5/runs/0"),
         ("out_of_range", "/tiles/6/x"),
+        ("bad_run", "/prior/0/runs/0"),
         ("bad_feature_id", "/removed/segments/0"),
     ];
     assert_eq!(said, expected.map(|(code, pointer)| (code.to_owned(), pointer.to_owned())));

@@ -1797,6 +1797,8 @@ export interface components {
             clusters: components["schemas"]["Cluster"][];
             /** @description Whether there is more to ask for right now. */
             more: boolean;
+            /** @description New or changed tiles of the prior, whole. */
+            prior?: components["schemas"]["PriorTile"][];
             /** @description What is no more. */
             removed: components["schemas"]["Removed"];
             /**
@@ -1892,6 +1894,21 @@ export interface components {
              * @description Position, y.
              */
             y_m: number;
+        };
+        /** @description What the prior says in one tile, which is no evidence of robots. */
+        PriorTile: {
+            /** @description Runs of equal log-odds, as in [`TileEvidence`]. */
+            runs: number[];
+            /**
+             * Format: int32
+             * @description Tiles to the right of the level's origin.
+             */
+            x: number;
+            /**
+             * Format: int32
+             * @description Tiles up from the level's origin.
+             */
+            y: number;
         };
         /** @description A refused request, in words that a person can act on. */
         Problem: {
@@ -2022,6 +2039,8 @@ export interface components {
             chains?: string[];
             /** @description Clusters. */
             clusters?: string[];
+            /** @description Tiles of the prior. */
+            prior?: components["schemas"]["TilePlace"][];
             /** @description Segments. */
             segments?: string[];
             /** @description Tiles. */

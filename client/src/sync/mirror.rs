@@ -57,8 +57,8 @@ pub enum ResyncReason {
     OtherFrame,
     /// The server's log ends before the mirror's revision: it was set back to an older backup.
     ServerWentBack,
-    /// At the same revision the server counts other numbers of segments, clusters, chains or tiles: it
-    /// was set back and has gone another way since.
+    /// At the same revision the server counts other numbers of segments, clusters, chains or tiles (the
+    /// prior's too): it was set back and has gone another way since.
     Diverged,
     /// The file on disk was damaged; it lies beside the new one as `level.mirror.damaged`.
     DamagedFile,
@@ -71,7 +71,7 @@ pub struct Refreshed {
     pub from_revision: i64,
     /// The revision now.
     pub to_revision: i64,
-    /// Segments, clusters, chains and tiles in the patches: new, changed or removed.
+    /// Segments, clusters, chains and tiles (the prior's too) in the patches: new, changed or removed.
     pub changes: usize,
     /// Why everything was read anew, if it was.
     pub resync: Option<ResyncReason>,
@@ -178,9 +178,13 @@ impl KnownMap {
     /// Whether the level, as it was described, counts other things at the same revision.
     fn contradicts(&self, level: &v1::LevelDescription) -> bool {
         let (map, counts) = (&self.map, &level.counts);
-        let here = [map.segments.len(), map.clusters.len(), map.chains.len(), map.tiles.len()];
-        let there = [counts.segments, counts.clusters, counts.chains, counts.tiles];
-        self.revision == level.folded_revision && here.map(|count| count as i64) != there
+        let features = [map.segments.len(), map.clusters.len(), map.chains.len()];
+        let there = [counts.segments, counts.clusters, counts.chains];
+        let tiles = [map.tiles.len(), map.prior.len()];
+        let tiles_there = [counts.tiles, counts.prior_tiles];
+        self.revision == level.folded_revision
+            && (features.map(|count| count as i64) != there
+                || tiles.map(|count| count as i64) != tiles_there)
     }
 }
 
@@ -430,14 +434,7 @@ async fn take_page(
         map_patch(&page).map_err(|violations| MirrorError::BadPatch { since, violations })?;
     apply(&patch, &mut known.map);
     known.revision = revision;
-    *changes += patch.segments.len()
-        + patch.clusters.len()
-        + patch.chains.len()
-        + patch.tiles.len()
-        + patch.removed_segments.len()
-        + patch.removed_clusters.len()
-        + patch.removed_chains.len()
-        + patch.removed_tiles.len();
+    *changes += patch.change_count();
     Ok(more)
 }
 

@@ -268,7 +268,7 @@ impl Level {
             .filter(|(key, _)| key.class == SensorClass::Scanner)
             .map(|(key, blocks)| (key.tile, *blocks))
             .collect();
-        let LevelMap { segments, clusters, chains, tiles } = &mut self.map;
+        let LevelMap { segments, clusters, chains, tiles, .. } = &mut self.map;
         let grid = Grid { tiles, resolution: self.config.resolution };
         let config = &self.config.vector;
         let walls = self.walls.update(inserted, removed, &touched, &grid, segments, config);

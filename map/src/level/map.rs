@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::FeatureId;
-use crate::raster::{Tile, TileKey};
+use crate::raster::{Tile, TileIndex, TileKey};
 use crate::vector::{Chain, ChainId, Cluster, Segment};
 
 /// What robots and operators see of a level: what [`super::diff`] compares and
@@ -19,4 +19,7 @@ pub struct LevelMap {
     pub chains: BTreeMap<ChainId, Arc<Chain>>,
     /// Evidence, tile by tile and layer by layer.
     pub tiles: BTreeMap<TileKey, Arc<Tile>>,
+    /// What was known before any robot came, tile by tile. No fold makes or reads it: it comes from
+    /// whoever imported it.
+    pub prior: BTreeMap<TileIndex, Arc<Tile>>,
 }

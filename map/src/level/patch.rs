@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::{FeatureId, LevelMap};
-use crate::raster::{Tile, TileKey};
+use crate::raster::{Tile, TileIndex, TileKey};
 use crate::vector::{Chain, ChainId, Cluster, Segment};
 
 /// New and changed things whole, removed things by their identity.
@@ -18,6 +18,8 @@ pub struct Patch {
     pub chains: BTreeMap<ChainId, Arc<Chain>>,
     /// New or changed tiles.
     pub tiles: BTreeMap<TileKey, Arc<Tile>>,
+    /// New or changed tiles of the prior.
+    pub prior: BTreeMap<TileIndex, Arc<Tile>>,
     /// Segments that are no more.
     pub removed_segments: Vec<FeatureId>,
     /// Clusters that are no more.
@@ -26,19 +28,24 @@ pub struct Patch {
     pub removed_chains: Vec<ChainId>,
     /// Tiles that hold no evidence any more.
     pub removed_tiles: Vec<TileKey>,
+    /// Tiles of which the prior says nothing any more.
+    pub removed_prior: Vec<TileIndex>,
 }
 
 impl Patch {
     /// Whether it changes nothing.
     pub fn is_empty(&self) -> bool {
-        self.segments.is_empty()
-            && self.clusters.is_empty()
-            && self.chains.is_empty()
-            && self.tiles.is_empty()
-            && self.removed_segments.is_empty()
-            && self.removed_clusters.is_empty()
-            && self.removed_chains.is_empty()
-            && self.removed_tiles.is_empty()
+        self.change_count() == 0
+    }
+
+    /// How many things it changes or removes.
+    pub fn change_count(&self) -> usize {
+        let changed = [self.segments.len(), self.clusters.len(), self.chains.len()];
+        let removed =
+            [self.removed_segments.len(), self.removed_clusters.len(), self.removed_chains.len()];
+        let tiles = [self.tiles.len(), self.removed_tiles.len()];
+        let prior = [self.prior.len(), self.removed_prior.len()];
+        changed.into_iter().chain(removed).chain(tiles).chain(prior).sum()
     }
 }
 
@@ -63,15 +70,18 @@ pub fn diff(a: &LevelMap, b: &LevelMap) -> Patch {
     let (clusters, removed_clusters) = diff_kind(&a.clusters, &b.clusters);
     let (chains, removed_chains) = diff_kind(&a.chains, &b.chains);
     let (tiles, removed_tiles) = diff_kind(&a.tiles, &b.tiles);
+    let (prior, removed_prior) = diff_kind(&a.prior, &b.prior);
     Patch {
         segments,
         clusters,
         chains,
         tiles,
+        prior,
         removed_segments,
         removed_clusters,
         removed_chains,
         removed_tiles,
+        removed_prior,
     }
 }
 
@@ -94,4 +104,5 @@ pub fn apply(patch: &Patch, map: &mut LevelMap) {
     apply_kind(&patch.clusters, &patch.removed_clusters, &mut map.clusters);
     apply_kind(&patch.chains, &patch.removed_chains, &mut map.chains);
     apply_kind(&patch.tiles, &patch.removed_tiles, &mut map.tiles);
+    apply_kind(&patch.prior, &patch.removed_prior, &mut map.prior);
 }

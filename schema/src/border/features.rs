@@ -97,6 +97,12 @@ pub fn map_cluster(cluster: &v1::Cluster) -> Result<(FeatureId, Cluster), Violat
 
 /// A tile for the wire: the longest possible runs, so that equal tiles give equal runs.
 pub fn wire_tile(key: &TileKey, tile: &Tile) -> v1::TileEvidence {
+    let (TileIndex { x, y }, runs) = (key.tile, wire_runs(tile));
+    v1::TileEvidence { sensor: key.class.into(), x, y, runs }
+}
+
+/// Equal cells in a row as start, length, value.
+fn wire_runs(tile: &Tile) -> Vec<i32> {
     let mut runs: Vec<i32> = Vec::new();
     let mut start = 0;
     for chunk in tile.cells().chunk_by(|a, b| a == b) {
@@ -105,7 +111,7 @@ pub fn wire_tile(key: &TileKey, tile: &Tile) -> v1::TileEvidence {
         }
         start += chunk.len() as i32;
     }
-    v1::TileEvidence { sensor: key.class.into(), x: key.tile.x, y: key.tile.y, runs }
+    runs
 }
 
 /// A tile from the wire.
@@ -127,11 +133,21 @@ pub fn wire_patch(patch: &level::Patch, since: i64, revision: i64, more: bool) -
         clusters: patch.clusters.iter().map(|(id, c)| wire_cluster(id, c)).collect(),
         chains: patch.chains.iter().map(|(id, c)| wire_chain(id, c)).collect(),
         tiles: patch.tiles.iter().map(|(key, t)| wire_tile(key, t)).collect(),
+        prior: patch
+            .prior
+            .iter()
+            .map(|(at, tile)| v1::PriorTile { x: at.x, y: at.y, runs: wire_runs(tile) })
+            .collect(),
         removed: v1::Removed {
             segments: patch.removed_segments.iter().map(feature_id).collect(),
             clusters: patch.removed_clusters.iter().map(feature_id).collect(),
             chains: patch.removed_chains.iter().map(chain_id).collect(),
             tiles: patch.removed_tiles.iter().map(wire_tile_address).collect(),
+            prior: patch
+                .removed_prior
+                .iter()
+                .map(|at| v1::TilePlace { x: at.x, y: at.y })
+                .collect(),
         },
     }
 }
@@ -159,6 +175,9 @@ pub fn map_patch(patch: &v1::Patch) -> Result<level::Patch, Vec<Violation>> {
         clusters: read_all(&patch.clusters, &root.field("clusters"), &mut wrong, read_cluster),
         chains: read_all(&patch.chains, &root.field("chains"), &mut wrong, read_chain),
         tiles: read_all(&patch.tiles, &root.field("tiles"), &mut wrong, read_tile),
+        prior: read_all(&patch.prior, &root.field("prior"), &mut wrong, |tile, place, wrong| {
+            read_cells([tile.x, tile.y], &tile.runs, place, wrong)
+        }),
         removed_segments: read_ids(
             &patch.removed.segments,
             &removed.field("segments"),
@@ -178,6 +197,12 @@ pub fn map_patch(patch: &v1::Patch) -> Result<level::Patch, Vec<Violation>> {
             read_chain_id,
         ),
         removed_tiles: patch.removed.tiles.iter().map(map_tile_address).collect(),
+        removed_prior: patch
+            .removed
+            .prior
+            .iter()
+            .map(|at| TileIndex { x: at.x, y: at.y })
+            .collect(),
     };
     wrong.none_or(Some(read))
 }
@@ -375,14 +400,24 @@ fn read_tile(
     place: &Place<'_>,
     wrong: &mut Violations,
 ) -> Option<(TileKey, Tile)> {
-    for (at, name) in [(tile.x, "x"), (tile.y, "y")] {
+    let (at, cells) = read_cells([tile.x, tile.y], &tile.runs, place, wrong)?;
+    Some((TileKey { class: tile.sensor.into(), tile: at }, cells))
+}
+
+fn read_cells(
+    [x, y]: [i32; 2],
+    runs: &[i32],
+    place: &Place<'_>,
+    wrong: &mut Violations,
+) -> Option<(TileIndex, Tile)> {
+    for (at, name) in [(x, "x"), (y, "y")] {
         if at.unsigned_abs() > TILE_INDEX_MAX {
             wrong.add(&place.field(name), "out_of_range", "this lies beyond any level");
         }
     }
     let place = place.field("runs");
     let mut cells = Box::new([0; TILE_CELLS]);
-    let (runs, rest) = tile.runs.as_chunks::<3>();
+    let (runs, rest) = runs.as_chunks::<3>();
     if !rest.is_empty() {
         wrong.add(
             &place,
@@ -410,8 +445,7 @@ fn read_tile(
             }
         }
     }
-    let key = TileKey { class: tile.sensor.into(), tile: TileIndex { x: tile.x, y: tile.y } };
-    Some((key, Tile::new(cells)))
+    Some((TileIndex { x, y }, Tile::new(cells)))
 }
 
 pub(super) fn read_id(text: &str, place: &Place<'_>, wrong: &mut Violations) -> Option<FeatureId> {

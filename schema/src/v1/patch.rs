@@ -38,6 +38,9 @@ pub struct Removed {
     /// Tiles.
     #[serde(default)]
     pub tiles: Vec<TileAddress>,
+    /// Tiles of the prior.
+    #[serde(default)]
+    pub prior: Vec<TilePlace>,
 }
 
 /// One layer's tile.
@@ -101,6 +104,17 @@ pub struct TileEvidence {
     pub runs: Vec<i32>,
 }
 
+/// What the prior says in one tile, which is no evidence of robots.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct PriorTile {
+    /// Tiles to the right of the level's origin.
+    pub x: i32,
+    /// Tiles up from the level's origin.
+    pub y: i32,
+    /// Runs of equal log-odds, as in [`TileEvidence`].
+    pub runs: Vec<i32>,
+}
+
 /// `GET L/patches`: all that changed after `since`, in pages.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Patch {
@@ -119,6 +133,9 @@ pub struct Patch {
     pub chains: Vec<Chain>,
     /// New or changed tiles, whole.
     pub tiles: Vec<TileEvidence>,
+    /// New or changed tiles of the prior, whole.
+    #[serde(default)]
+    pub prior: Vec<PriorTile>,
     /// What is no more.
     pub removed: Removed,
 }

@@ -96,10 +96,16 @@ pub fn layered_at(
     layered(parts.into_iter().filter_map(tile))
 }
 
-/// What robots saw; a map knows of no prior, and holds its walls as segments.
+/// What robots saw, and the prior; walls a map holds as segments.
 impl Raster for LevelMap {
     fn between(&self, layer: LayerId, first: TileIndex, last: TileIndex) -> LayerTiles<'_> {
-        let LayerId::Sensor(class) = layer else { return Box::new(std::iter::empty()) };
+        let class = match layer {
+            LayerId::Sensor(class) => class,
+            LayerId::Prior => {
+                return Box::new(self.prior.range(first..=last).map(|(at, tile)| (*at, tile)));
+            }
+            LayerId::Walls => return Box::new(std::iter::empty()),
+        };
         let key = |tile| TileKey { class, tile };
         let range = self.tiles.range(key(first)..=key(last));
         Box::new(range.map(|(key, tile)| (key.tile, tile)))

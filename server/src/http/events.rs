@@ -170,7 +170,10 @@ impl Feed {
                         + patch.removed_segments.len()
                         + patch.removed_clusters.len()
                         + patch.removed_chains.len()) as u32,
-                    tiles: (patch.tiles.len() + patch.removed_tiles.len()) as u32,
+                    tiles: (patch.tiles.len()
+                        + patch.removed_tiles.len()
+                        + patch.prior.len()
+                        + patch.removed_prior.len()) as u32,
                     acts: 0,
                 }),
                 Err(_) => self.resync(),

@@ -240,6 +240,7 @@ impl MapHistory {
         revisions(&self.clusters, since, limit, &mut changed);
         revisions(&self.chains, since, limit, &mut changed);
         revisions(&self.tiles, since, limit, &mut changed);
+        revisions(&self.prior, since, limit, &mut changed);
         if changed.len() <= limit {
             return None;
         }

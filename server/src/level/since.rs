@@ -179,14 +179,17 @@ impl Snapshot {
         let (clusters, removed_clusters) = changed(&history.clusters, since, until);
         let (chains, removed_chains) = changed(&history.chains, since, until);
         let (tiles, removed_tiles) = changed(&history.tiles, since, until);
+        let (prior, removed_prior) = changed(&history.prior, since, until);
         patch.segments.extend(segments);
         patch.clusters.extend(clusters);
         patch.chains.extend(chains);
         patch.tiles.extend(tiles);
+        patch.prior.extend(prior);
         patch.removed_segments = removed_segments;
         patch.removed_clusters = removed_clusters;
         patch.removed_chains = removed_chains;
         patch.removed_tiles = removed_tiles;
+        patch.removed_prior = removed_prior;
         patch
     }
 }

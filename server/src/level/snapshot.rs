@@ -99,6 +99,7 @@ impl Snapshot {
                 clusters: self.clusters().map(|(id, c)| (*id, Arc::clone(c))).collect(),
                 chains: self.chains().map(|(id, c)| (*id, Arc::clone(c))).collect(),
                 tiles: self.tiles().map(|(key, t)| (*key, Arc::clone(t))).collect(),
+                prior: self.history.prior.live().map(|(at, t)| (*at, Arc::clone(t))).collect(),
             })
         }))
     }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use mapfold_map::level::LevelMap;
 use mapfold_map::raster::{TILE_CELLS, Tile, TileIndex};
 use mapfold_schema::v1;
 use mapfold_server::level::{LevelHandle, LevelOptions, Snapshot};
@@ -10,7 +11,7 @@ use mapfold_server::store::imports::NewImport;
 use uuid::Uuid;
 
 use crate::engines::{Database, killed_after};
-use crate::levels_in_memory::{open, reached, still, submit_all};
+use crate::levels_in_memory::{Mirror, open, reached, still, submit_all};
 use crate::reverts::{act, of_robot};
 use crate::synthetic::{LEVEL, SITE, START_US, folded, furnish, looks};
 
@@ -83,6 +84,11 @@ async fn story(level: &LevelHandle) -> i64 {
     level.import(&import(2, &SECOND)).await.unwrap().unwrap().revision
 }
 
+/// What robots saw of it.
+fn seen(snapshot: &Snapshot) -> LevelMap {
+    LevelMap { prior: BTreeMap::new(), ..LevelMap::clone(&snapshot.map()) }
+}
+
 fn kept() -> Vec<v1::Contribution> {
     looks(91, 40).into_iter().filter(|look| look.robot != "bert").collect()
 }
@@ -96,13 +102,19 @@ async fn imports_leave_the_fold_alone_and_every_replica_has_the_same_prior(datab
     let end = story(&level).await;
     let here = reached(&level, end).await;
     assert_eq!(end, 43);
-    assert_eq!(&*here.map(), folded(&kept()).map());
+    assert_eq!(&seen(&here), folded(&kept()).map());
     assert_eq!(prior(&here), of(&SECOND));
     let there = reached(&other, end).await;
     assert_eq!(prior(&there), of(&SECOND));
     for since in 0..=end {
         let changes = |snapshot: &Snapshot| snapshot.raster_since(since, None).unwrap();
         assert_eq!(changes(&here), changes(&there), "since {since}");
+    }
+    // A mirror has it too, in whatever pages.
+    for limit in [1, 3, 1000] {
+        let mut mirror = Mirror::default();
+        mirror.follow(&there, limit);
+        assert_eq!(&mirror.map, &*here.map());
     }
     let place = |x, y| v1::TilePlace { x, y };
     let since = here.raster_since(21, None).unwrap();
@@ -117,6 +129,11 @@ async fn imports_leave_the_fold_alone_and_every_replica_has_the_same_prior(datab
     level.import(&removal(3)).await.unwrap().unwrap();
     let bare = reached(&other, 44).await;
     assert_eq!(prior(&bare), BTreeMap::new());
+    let mut mirror = Mirror::default();
+    mirror.follow(&here, 7);
+    assert_eq!(mirror.map.prior.len(), 2);
+    mirror.follow(&bare, 7);
+    assert_eq!(&mirror.map, folded(&kept()).map());
     drop((level, here));
     levels.shutdown().await;
     let report = verify(&stores[0], SITE, LEVEL).await.unwrap().unwrap();
@@ -143,7 +160,7 @@ async fn a_killed_level_comes_back_with_its_prior(database: Database) {
         let (levels, level) = open(&store, still()).await;
         let snapshot = reached(&level, end).await;
         assert_eq!(prior(&snapshot), of(&SECOND));
-        assert_eq!(&*snapshot.map(), folded(&kept()).map());
+        assert_eq!(&seen(&snapshot), folded(&kept()).map());
         // A reader of any revision since the first import learns what is gone.
         for since in 21..end {
             let changes = snapshot.raster_since(since, None).unwrap();

@@ -2,14 +2,14 @@
 //!
 //! ```text
 //! "MFMIRROR"          8 bytes
-//! version             u32, little-endian, 3
+//! version             u32, little-endian, 4
 //! checksum            32 bytes, SHA-256 of all that follows
 //! payload             CBOR of the level, its frame, its revision and the map as a patch from
 //!                     nothing, zstd
 //! ```
 //!
-//! A file of version 1 knows no chains, one of version 2 no existence: of these only the level and
-//! its frame are taken over, and the map is fetched anew.
+//! A file of version 1 knows no chains, one of version 2 no existence, one of version 3 no prior: of
+//! these only the level and its frame are taken over, and the map is fetched anew.
 
 use std::fs;
 use std::io;
@@ -30,7 +30,7 @@ use crate::sync::durable::{self, DiskError, at};
 
 const FILE: &str = "level.mirror";
 const MAGIC: &[u8; 8] = b"MFMIRROR";
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const ZSTD_LEVEL: i32 = 3;
 
 /// What a file holds.

@@ -1,7 +1,9 @@
 //! Mirrors against a level that goes on, goes back, and is made anew.
 
 use std::fs;
+use std::sync::Arc;
 
+use mapfold_map::raster::{TILE_CELLS, Tile, TileIndex};
 use proptest::prelude::*;
 use rand::SeedableRng;
 use rand::rngs::StdRng;
@@ -253,6 +255,21 @@ async fn a_damaged_file_is_set_aside_and_everything_read_anew() {
     }
 }
 
+#[test]
+fn the_prior_is_on_disk_with_the_rest() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut known = KnownMap { revision: 7, map: LevelMap::default() };
+    let mut cells = Box::new([0; TILE_CELLS]);
+    cells[70] = 200;
+    cells[71..90].fill(-25);
+    known.map.prior.insert(TileIndex { x: -3, y: 8 }, Arc::new(Tile::new(cells)));
+    let ground = Ground { frame: FRAME, resolution_m: 0.05 };
+    let saved = Saved { level: level(), ground, known: known.clone() };
+    file::write(folder.path(), &saved).unwrap();
+    let mirror = open(&folder);
+    assert_eq!((mirror.map(), mirror.revision()), (&known.map, 7));
+}
+
 /// A file of format `version`, whose map nobody can read any more.
 fn file_of(version: u32) -> Vec<u8> {
     #[derive(serde::Serialize)]
@@ -280,7 +297,7 @@ async fn a_file_of_an_older_version_is_fetched_anew_without_a_word() {
     let folder = tempfile::tempdir().unwrap();
     open(&folder).refresh(&api_of(&stub)).await.unwrap();
     let path = folder.path().join("level.mirror");
-    for version in [1, 2] {
+    for version in [1, 2, 3] {
         fs::write(&path, file_of(version)).unwrap();
         let mut mirror = open(&folder);
         assert_eq!((mirror.revision(), mirror.frame()), (0, Some(FRAME)));
@@ -288,7 +305,7 @@ async fn a_file_of_an_older_version_is_fetched_anew_without_a_word() {
         assert_eq!((refreshed.to_revision, refreshed.resync), (9, None));
         assert_eq!(mirror.map(), stub.ledger().map());
     }
-    for version in [0, 3, 4] {
+    for version in [0, 4, 5] {
         fs::write(&path, file_of(version)).unwrap();
         assert_eq!(open(&folder).resync, Some(ResyncReason::DamagedFile), "version {version}");
     }

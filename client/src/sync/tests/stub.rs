@@ -413,7 +413,7 @@ fn counts(map: &LevelMap) -> v1::Counts {
         clusters: map.clusters.len() as i64,
         chains: map.chains.len() as i64,
         tiles: map.tiles.len() as i64,
-        prior_tiles: 0,
+        prior_tiles: map.prior.len() as i64,
     }
 }
 
