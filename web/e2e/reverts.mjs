@@ -106,14 +106,14 @@ try {
   await page.locator("#log-reason").focus();
   await page.keyboard.type("its scanner had come loose");
   await page.keyboard.press("Enter");
-  await page.locator(".done").waitFor();
+  await page.locator(".log-form .done").waitFor();
   await page.locator(".reverts li").first().waitFor();
   await painted(page, before.revision + 1);
   await page.locator(".log-lines li.out").first().waitFor();
   say({
     event: "out",
     ...(await facts(page)),
-    done: await page.locator(".done").innerText(),
+    done: await page.locator(".log-form .done").innerText(),
     lines_out: await page.locator(".log-lines li.out").count(),
   });
   await shoot(page, "out");
@@ -124,10 +124,10 @@ try {
   say({ event: "undo_preview", text: await page.locator(".told").innerText() });
   await page.locator("#log-confirm").focus();
   await page.keyboard.press("Enter");
-  await page.locator(".done").waitFor();
+  await page.locator(".log-form .done").waitFor();
   await painted(page, before.revision + 2);
   await page.locator(".reverts li.undone").waitFor();
-  say({ event: "back", ...(await facts(page)), done: await page.locator(".done").innerText() });
+  say({ event: "back", ...(await facts(page)), done: await page.locator(".log-form .done").innerText() });
   await shoot(page, "back");
 
   // Somebody else is faster: what the page tried out is out already.
