@@ -25,14 +25,18 @@ fn sinces() -> impl Iterator<Item = i64> {
     (0..=LOOKS as i64).step_by(8)
 }
 
-/// Submits all looks, then dies; what readers were told last.
-async fn live_and_die(database: &Database, options: LevelOptions) -> Vec<Vec<u8>> {
+/// Submits all looks, then dies as soon as rows of revision `written` are stored; what readers were told last.
+async fn live_and_die(database: &Database, options: LevelOptions, written: i64) -> Vec<Vec<u8>> {
     let database = database.clone();
     killed_after(move || async move {
         let store = database.store().await;
         furnish(&store).await;
         let (_levels, level) = open(&store, options).await;
         let snapshot = submit_all(&level, &looks(21, LOOKS)).await;
+        // Rows are written behind the answers, whenever the machine finds the time.
+        while store.revisions(SITE, LEVEL).await.unwrap().unwrap().folded < written {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
         sinces().map(|since| bits(&snapshot, since)).collect()
     })
     .await
@@ -49,7 +53,7 @@ async fn comes_back(database: &Database, before: &[Vec<u8>]) {
 }
 
 async fn a_killed_level_comes_back_bit_for_bit_from_its_log_alone(database: Database) {
-    let before = live_and_die(&database, still()).await;
+    let before = live_and_die(&database, still(), 0).await;
     let store = database.store().await;
     assert_eq!(store.revisions(SITE, LEVEL).await.unwrap().unwrap().folded, 0);
     comes_back(&database, &before).await;
@@ -59,7 +63,7 @@ async fn a_killed_level_comes_back_bit_for_bit_from_rows_and_the_rest_of_its_log
     database: Database,
 ) {
     let options = LevelOptions { write_behind_revisions: 70, ..still() };
-    let before = live_and_die(&database, options).await;
+    let before = live_and_die(&database, options, 70).await;
     let stored = database.store().await.revisions(SITE, LEVEL).await.unwrap().unwrap();
     assert!(stored.folded >= 70 && stored.log == LOOKS as i64, "{stored:?}");
     comes_back(&database, &before).await;
