@@ -1,7 +1,7 @@
 //! A `building.yaml` of Open-RMF's traffic editor as objects of the GDB: walls, doorways and floors of one level.
 //!
 //! * `yaml`: a tree of bounded depth and size, with places.
-//! * [`document`]: what the keys mean.
+//! * `document`: what the keys mean.
 //! * `frame`: from the drawing's units to metres, by measurements or by fiducials of the reference level.
 //! * `solids`: walls that close at corners, and doorways in walls.
 //!

@@ -22,8 +22,8 @@ pub struct SonarRing {
     pub lost_share: f64,
     /// Share of corners and edges well inside of the cone that echo.
     pub corners_share: f64,
-    /// Share of pulses that walls threw aside and that come back by a detour, later by up to
-    /// [`DETOUR_M`].
+    /// Share of pulses that walls threw aside and that come back by a detour, 0.3 to 3 m
+    /// later.
     pub detour_share: f64,
     /// Share of readings that are another sonar's pulse: anything.
     pub crosstalk_share: f64,
