@@ -29,6 +29,7 @@ pub mod tokens;
 mod dialect;
 mod engine;
 mod error;
+mod pages;
 mod row;
 mod transaction;
 mod values;

@@ -9,7 +9,7 @@ use uuid::Uuid;
 
 use super::acts::next_revision;
 use super::payload::PayloadError;
-use super::row::{corrupt, get, next_page};
+use super::row::{corrupt, get};
 use super::transaction::Tx;
 use super::values::{Bulk, bulk};
 use super::{Store, StoreError, retried, tile_cells};
@@ -152,15 +152,9 @@ impl Store {
         before: Option<i64>,
         limit: u32,
     ) -> Result<v1::ImportPage, StoreError> {
-        let rows = sqlx::query(imports!("and revision < $3 order by revision desc limit $4"))
-            .bind(site)
-            .bind(level)
-            .bind(before.unwrap_or(i64::MAX))
-            .bind(i64::from(limit) + 1)
-            .fetch_all(self.reads())
-            .await?;
-        let mut imports = rows.iter().map(describe).collect::<Result<Vec<_>, _>>()?;
-        let next = next_page(&mut imports, limit, |last| last.revision);
+        let select = imports!("and revision < $3 order by revision desc limit $4");
+        let (imports, next) =
+            self.page(select, (site, level), before, limit, describe, |last| last.revision).await?;
         Ok(v1::ImportPage { imports, next })
     }
 

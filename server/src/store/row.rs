@@ -35,15 +35,3 @@ pub(super) fn count(
     let value: i64 = get(row, table, column)?;
     u32::try_from(value).map_err(|e| corrupt(table, column, e))
 }
-
-/// Takes the row that was read beyond a page off again, and tells the `before` of the next page if there
-/// was one: the revision of the last row that stays.
-pub(super) fn next_page<T>(
-    rows: &mut Vec<T>,
-    limit: u32,
-    revision: impl FnOnce(&T) -> i64,
-) -> Option<String> {
-    let more = rows.len() > limit as usize;
-    rows.truncate(limit as usize);
-    rows.last().filter(|_| more).map(|last| revision(last).to_string())
-}

@@ -7,7 +7,7 @@ use uuid::Uuid;
 
 use super::{ActRow, TABLE, parse_kind};
 use crate::store::revision_list;
-use crate::store::row::{corrupt, count, get, next_page};
+use crate::store::row::{corrupt, count, get};
 use crate::store::transaction::Tx;
 use crate::store::values::{Bulk, bulk_in};
 use crate::store::{Store, StoreError};
@@ -47,15 +47,9 @@ impl Store {
         before: Option<i64>,
         limit: u32,
     ) -> Result<v1::RevertPage, StoreError> {
-        let rows = sqlx::query(reverts!("and a.revision < $3 order by a.revision desc limit $4"))
-            .bind(site)
-            .bind(level)
-            .bind(before.unwrap_or(i64::MAX))
-            .bind(i64::from(limit) + 1)
-            .fetch_all(self.reads())
-            .await?;
-        let mut reverts = rows.iter().map(describe).collect::<Result<Vec<_>, _>>()?;
-        let next = next_page(&mut reverts, limit, |last| last.revision);
+        let select = reverts!("and a.revision < $3 order by a.revision desc limit $4");
+        let (reverts, next) =
+            self.page(select, (site, level), before, limit, describe, |last| last.revision).await?;
         Ok(v1::RevertPage { reverts, next })
     }
 

@@ -4,7 +4,7 @@ use mapfold_schema::v1;
 use uuid::Uuid;
 
 use super::super::library::library_revision;
-use super::super::row::{get, next_page};
+use super::super::row::get;
 use super::super::transaction::Tx;
 use super::super::{Store, StoreError};
 use super::{ENTRIES, GdbState, GdbVersion, OBJECTS, Publication, describe, entries, object_id};
@@ -87,15 +87,9 @@ impl Store {
         before: Option<i64>,
         limit: u32,
     ) -> Result<v1::GdbEntryPage, StoreError> {
-        let rows = sqlx::query(entries!("and revision < $3 order by revision desc limit $4"))
-            .bind(site)
-            .bind(level)
-            .bind(before.unwrap_or(i64::MAX))
-            .bind(i64::from(limit) + 1)
-            .fetch_all(self.reads())
-            .await?;
-        let mut entries = rows.iter().map(describe).collect::<Result<Vec<_>, _>>()?;
-        let next = next_page(&mut entries, limit, |last| last.revision);
+        let select = entries!("and revision < $3 order by revision desc limit $4");
+        let (entries, next) =
+            self.page(select, (site, level), before, limit, describe, |last| last.revision).await?;
         Ok(v1::GdbEntryPage { entries, next })
     }
 
