@@ -16,6 +16,7 @@ mod history;
 mod open;
 pub(crate) mod prior;
 pub(crate) mod recall;
+mod recent;
 mod registry;
 mod reverting;
 pub(crate) mod rows;
@@ -41,8 +42,8 @@ pub use reverting::RevertError;
 pub use since::SinceError;
 pub use snapshot::Snapshot;
 
-use crate::store::Store;
 use crate::store::levels::LevelRow;
+use crate::store::{Store, StoreError};
 use append::Waiting;
 use gdb::ModelCache;
 use registry::DiskAlarm;
@@ -136,6 +137,20 @@ impl LevelHandle {
     /// Edge of a cell, metres.
     pub fn resolution_m(&self) -> f64 {
         self.shared.row.resolution_m
+    }
+
+    /// A disk that has failed under an entry of the log has failed under all.
+    fn watched<T>(&self, outcome: Result<T, StoreError>) -> Result<T, StoreError> {
+        if let Err(StoreError::DiskFailed(why)) = &outcome {
+            self.shared.alarm.raise(why.clone());
+        }
+        outcome
+    }
+
+    /// Has the folder look for what is in the log at `revision`.
+    fn look_for(&self, revision: i64) {
+        self.shared.head.fetch_max(revision, Ordering::AcqRel);
+        self.shared.look.notify_one();
     }
 
     /// What a contribution to it is checked against.

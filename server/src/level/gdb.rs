@@ -4,8 +4,7 @@
 //! take their places in the log.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::Ordering;
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use mapfold_map::gdb::{
     Finding, Landmark, LandmarkConfig, Model, Plan, PriorError, PrototypeName, Shape, Structure,
@@ -20,6 +19,7 @@ use uuid::Uuid;
 
 use super::LevelHandle;
 use super::open::aside;
+use super::recent::Recent;
 use crate::store::gdb::{GdbChange, GdbOutcome, GdbState, GdbVersion, NewGdbEntry, Publication};
 use crate::store::{Store, StoreError};
 
@@ -76,8 +76,8 @@ pub struct GdbModel {
     model: Model,
     structure: OnceLock<Structure>,
     findings: OnceLock<Vec<Finding>>,
-    /// By height, the last one asked for last.
-    cuts: Mutex<Vec<(u64, Arc<Cut>)>>,
+    /// By the bits of their heights.
+    cuts: Recent<u64, Cut>,
     /// Held while a cut is made: what several ask for is made once.
     making: Mutex<()>,
 }
@@ -123,7 +123,7 @@ impl GdbModel {
             model,
             structure: OnceLock::new(),
             findings: OnceLock::new(),
-            cuts: Mutex::default(),
+            cuts: Recent::new(PLANS_MAX),
             making: Mutex::default(),
         })
     }
@@ -181,63 +181,28 @@ impl GdbModel {
 
     fn cut(&self, height_m: f64) -> Result<Arc<Cut>, GdbError> {
         let key = height_m.to_bits();
-        if let Some(cut) = self.known_cut(key) {
+        if let Some(cut) = self.cuts.get(&key) {
             return Ok(cut);
         }
         let _turn = self.making.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(cut) = self.known_cut(key) {
+        if let Some(cut) = self.cuts.get(&key) {
             return Ok(cut);
         }
         let structure = self.structure.get_or_init(|| Structure::of(&self.model));
         let plan = structure.plan_within(height_m, PLAN_MAX)?;
         let cut = Arc::new(Cut { plan, landmarks: OnceLock::new() });
-        let mut cuts = self.cuts();
-        if cuts.len() >= PLANS_MAX {
-            cuts.remove(0);
-        }
-        cuts.push((key, Arc::clone(&cut)));
+        self.cuts.put(key, &cut);
         Ok(cut)
-    }
-
-    fn known_cut(&self, key: u64) -> Option<Arc<Cut>> {
-        let mut cuts = self.cuts();
-        let at = cuts.iter().position(|(height, _)| *height == key)?;
-        let found = cuts.remove(at);
-        let cut = Arc::clone(&found.1);
-        cuts.push(found);
-        Some(cut)
-    }
-
-    fn cuts(&self) -> MutexGuard<'_, Vec<(u64, Arc<Cut>)>> {
-        // Nothing that runs under this lock can leave it half done.
-        self.cuts.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// The models that were asked for last, the last one last.
-#[derive(Debug, Default)]
-pub(super) struct ModelCache(Mutex<Vec<Arc<GdbModel>>>);
+/// The models of a level that were asked for last.
+#[derive(Debug)]
+pub(super) struct ModelCache(Recent<GdbVersion, GdbModel>);
 
-impl ModelCache {
-    fn get(&self, version: GdbVersion) -> Option<Arc<GdbModel>> {
-        let mut models = self.models();
-        let at = models.iter().position(|model| model.version == version)?;
-        let found = models.remove(at);
-        models.push(Arc::clone(&found));
-        Some(found)
-    }
-
-    fn put(&self, model: Arc<GdbModel>) {
-        let mut models = self.models();
-        models.retain(|other| other.version != model.version);
-        if models.len() >= MODELS_MAX {
-            models.remove(0);
-        }
-        models.push(model);
-    }
-
-    fn models(&self) -> MutexGuard<'_, Vec<Arc<GdbModel>>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+impl Default for ModelCache {
+    fn default() -> Self {
+        Self(Recent::new(MODELS_MAX))
     }
 }
 
@@ -362,12 +327,13 @@ impl LevelHandle {
     /// # Errors
     /// The store fails, or the model is too large.
     pub async fn gdb_model(&self, version: GdbVersion) -> Result<Arc<GdbModel>, GdbError> {
-        if let Some(found) = self.shared.models.get(version) {
+        let models = &self.shared.models.0;
+        if let Some(found) = models.get(&version) {
             return Ok(found);
         }
         let read = read_model(&self.shared.store, self.site(), self.level(), version).await?;
         let model = Arc::new(read);
-        self.shared.models.put(Arc::clone(&model));
+        models.put(version, &model);
         Ok(model)
     }
 
@@ -399,14 +365,10 @@ impl LevelHandle {
         &self,
         outcome: Result<GdbOutcome, StoreError>,
     ) -> Result<GdbOutcome, StoreError> {
-        if let Err(StoreError::DiskFailed(why)) = &outcome {
-            self.shared.alarm.raise(why.clone());
-        }
-        let outcome = outcome?;
+        let outcome = self.watched(outcome)?;
         if let GdbOutcome::Done(entry) = &outcome {
             metrics::counter!("mapfold_gdb_entries_total").increment(1);
-            self.shared.head.fetch_max(entry.revision, Ordering::AcqRel);
-            self.shared.look.notify_one();
+            self.look_for(entry.revision);
         }
         Ok(outcome)
     }

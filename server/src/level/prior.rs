@@ -5,7 +5,6 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 use mapfold_map::raster::{Tile, TileIndex};
 use mapfold_schema::v1;
@@ -86,14 +85,10 @@ impl LevelHandle {
     /// again does no harm.
     pub async fn import(&self, new: &NewImport) -> Result<Option<v1::Import>, StoreError> {
         let imported = self.shared.store.import(self.site(), self.level(), new).await;
-        if let Err(StoreError::DiskFailed(why)) = &imported {
-            self.shared.alarm.raise(why.clone());
-        }
-        let imported = imported?;
+        let imported = self.watched(imported)?;
         if let Some(imported) = &imported {
             metrics::counter!("mapfold_imports_total").increment(1);
-            self.shared.head.fetch_max(imported.revision, Ordering::AcqRel);
-            self.shared.look.notify_one();
+            self.look_for(imported.revision);
         }
         Ok(imported)
     }

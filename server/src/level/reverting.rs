@@ -3,7 +3,6 @@
 //! An act goes into the log past the queue of contributions, under the same lock of the level's
 //! row; the folder then finds it there, like what another replica has put in.
 
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use mapfold_schema::v1;
@@ -140,19 +139,5 @@ impl LevelHandle {
             features,
             more_features,
         })
-    }
-
-    /// A disk that has failed under an act has failed under all.
-    fn watched<T>(&self, outcome: Result<T, StoreError>) -> Result<T, StoreError> {
-        if let Err(StoreError::DiskFailed(why)) = &outcome {
-            self.shared.alarm.raise(why.clone());
-        }
-        outcome
-    }
-
-    /// Has the folder look for what is in the log at `revision`.
-    fn look_for(&self, revision: i64) {
-        self.shared.head.fetch_max(revision, Ordering::AcqRel);
-        self.shared.look.notify_one();
     }
 }
