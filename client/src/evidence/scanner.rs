@@ -152,17 +152,13 @@ fn free(fan: &Fan, rings: &Rings, start: Point, rows: usize, canvas: &mut Canvas
             Some(before) if sheaf.joins(before) => outline.edge(at(before, before.free), end),
             // What lies between a near end and a far one was seen as far as the near one; the far one's
             // beam went on by itself.
-            Some(before) if before.free < sheaf.free => {
-                let beside = at(sheaf, before.free);
-                outline.edge(at(before, before.free), beside);
-                outline.edge(beside, end);
-                cross(sheaf, before.free, &start, rings, canvas);
-            }
             Some(before) => {
-                let beside = at(before, sheaf.free);
+                let (near, far) =
+                    if before.free < sheaf.free { (before, sheaf) } else { (sheaf, before) };
+                let beside = at(far, near.free);
                 outline.edge(at(before, before.free), beside);
                 outline.edge(beside, end);
-                cross(before, sheaf.free, &start, rings, canvas);
+                cross(far, near.free, &start, rings, canvas);
             }
         }
         let next = fan.sheaves.get(index + 1).or(fan.sheaves.first());
