@@ -66,6 +66,12 @@ export function keyed<T>(
   };
 }
 
+/** A line of a log that never changes: what was done, and by whom. */
+export function logRow<T>(what: string, whose: string): Row<T> {
+  const element = el("li", {}, el("span", { class: "name", text: what }), el("span", { class: "what", text: whose }));
+  return { element, draw: () => undefined };
+}
+
 /** A small swatch of a line as the map draws it. */
 export function swatch(): { element: SVGSVGElement; draw: (stroke: { colour: string; dash: readonly number[] }) => void } {
   const space = "http://www.w3.org/2000/svg";

@@ -1,9 +1,10 @@
 // What the model card asks of the server: the log of the model, what is wrong with its draft, and to publish it.
 
-import { inWords, isAborted, Refused, type Api } from "./api";
+import { inWords, isAborted, type Api } from "./api";
 import type { DraftState } from "./drafts";
 import type { Place } from "./permalink";
-import { samePlace, type State } from "./state";
+import { hasEnded } from "./session";
+import { may, samePlace, type State } from "./state";
 import type { Dispatch } from "./store";
 
 /** Entries that the card shows. */
@@ -30,11 +31,7 @@ export function createDraftActions({ api, state, dispatch }: DraftActionsOptions
     dispatch({ kind: "draft", draft });
   };
   const failed = (place: Place, error: unknown): void => {
-    if (isAborted(error) || !samePlace(place, state().place)) return;
-    if (error instanceof Refused && error.status === 401) {
-      dispatch({ kind: "session", session: { kind: "out", problem: "Your session has ended. Sign in again." } });
-      return;
-    }
+    if (isAborted(error) || !samePlace(place, state().place) || hasEnded(error, dispatch)) return;
     change({ busy: null, problem: inWords(error) });
   };
 
@@ -82,4 +79,9 @@ export function createDraftActions({ api, state, dispatch }: DraftActionsOptions
     },
     publish: () => void publish(),
   };
+}
+
+/** Whether the operator may publish. */
+export function mayPublish(state: State): boolean {
+  return may(state, "map:publish");
 }

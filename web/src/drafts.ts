@@ -1,6 +1,5 @@
 // What the model card knows: who edited and published the a-priori model, and what is wrong with its draft. Pure.
 
-import type { State } from "./state";
 import type { GdbEntry, GdbFinding } from "./wire";
 import { count, counted, instant } from "./words";
 
@@ -41,11 +40,6 @@ export const READINESS_WORDS: Readonly<Record<Readiness, string>> = {
   "has-errors": "The draft has errors, so it cannot be published.",
   ready: "The draft is another than what robots have.",
 };
-
-/** Whether the operator may publish. */
-export function mayPublish({ session }: State): boolean {
-  return session.kind === "in" && session.who.scopes.some((scope) => scope === "map:publish" || scope === "admin");
-}
 
 /** An entry in one line. */
 export function entryInWords({ kind, draft, put, removed, comment }: GdbEntry): string {

@@ -16,7 +16,9 @@
 import { tileCount } from "./content";
 import type { Painted } from "./map/view";
 import { memo } from "./memo";
+import { cornersOf } from "./model";
 import { robotsHere, type State } from "./state";
+import type { GdbPlan } from "./wire";
 
 export interface Facts {
   /** After the panels were drawn. */
@@ -27,6 +29,7 @@ export interface Facts {
 
 export function createFacts(root: HTMLElement): Facts {
   const tiles = memo(tileCount);
+  const plan = memo((shown: GdbPlan | null) => (shown === null ? "" : `${shown.height_m} ${cornersOf(shown).length}`));
   const say = (name: string, value: string | number): void => {
     const text = String(value);
     if (root.dataset[name] !== text) root.dataset[name] = text;
@@ -37,8 +40,7 @@ export function createFacts(root: HTMLElement): Facts {
       say("site", place?.site ?? "");
       say("level", place?.level ?? "");
       say("live", link.kind);
-      const corners = [...(model.plan?.outlines ?? []), ...(model.plan?.sheets ?? [])].flat().length;
-      say("model", model.plan === null ? "" : `${model.plan.height_m} ${corners}`);
+      say("model", plan(model.plan));
       say("landmarks", model.landmarks.size);
     },
     painted(state, { piecesPainted, picturesLoaded, picturesPending }) {

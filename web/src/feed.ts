@@ -5,6 +5,7 @@
 import { eventsPath, inWords, isAborted, Refused, type Api } from "./api";
 import { createCoalescer, type Timers } from "./coalesce";
 import type { Place } from "./permalink";
+import { hasEnded } from "./session";
 import { robotsHere, type Link, type State } from "./state";
 import type { Dispatch } from "./store";
 import type { LevelEvent } from "./wire";
@@ -65,11 +66,7 @@ export function followLevel(options: FeedOptions): () => void {
   };
 
   const failed = (error: unknown): void => {
-    if (signal.aborted || isAborted(error)) return;
-    if (error instanceof Refused && error.status === 401) {
-      dispatch({ kind: "session", session: { kind: "out", problem: "Your session has ended. Sign in again." } });
-      return;
-    }
+    if (signal.aborted || isAborted(error) || hasEnded(error, dispatch)) return;
     if (error instanceof Refused && error.status < 500) dispatch({ kind: "trouble", trouble: inWords(error) });
     lost(inWords(error));
   };

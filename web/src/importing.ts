@@ -1,8 +1,9 @@
 // What the prior card asks of the server: what is in a map, making it the prior, taking it away, and
 // what was imported so far.
 
-import { inWords, isAborted, Refused, type Api } from "./api";
+import { inWords, isAborted, type Api } from "./api";
 import { NO_IMPORTS, type ImportsState } from "./imports";
+import { hasEnded } from "./session";
 import { samePlace, type State } from "./state";
 import type { Dispatch } from "./store";
 import { counted } from "./words";
@@ -36,11 +37,7 @@ export function createImportActions({ api, state, dispatch }: ImportActionsOptio
     dispatch({ kind: "imports", imports });
   };
   const failed = (error: unknown): void => {
-    if (isAborted(error)) return;
-    if (error instanceof Refused && error.status === 401) {
-      dispatch({ kind: "session", session: { kind: "out", problem: "Your session has ended. Sign in again." } });
-      return;
-    }
+    if (isAborted(error) || hasEnded(error, dispatch)) return;
     change({ busy: null, problem: inWords(error) });
   };
 

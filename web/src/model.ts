@@ -1,7 +1,7 @@
 // What the page knows of the a-priori model (GDB): its plan at one height, and its landmarks. Pure.
 
-import { union, type Box, type Point } from "./geometry";
-import type { GdbPlan, Landmark, LandmarkKind } from "./wire";
+import { union, type Box } from "./geometry";
+import type { GdbPlan, Landmark, LandmarkKind, PlanCorner } from "./wire";
 
 /** Which model is shown: what robots have, or what is being edited. */
 export const MODEL_STATES = ["published", "draft"] as const;
@@ -46,25 +46,18 @@ export function isRead(model: ModelState, revision: number): boolean {
   return model.revision === revision && model.readAs === model.view;
 }
 
+/** All corners of a plan. */
+export function cornersOf({ outlines, sheets }: GdbPlan): PlanCorner[] {
+  return [...outlines, ...sheets].flat();
+}
+
 /** The least box that holds a plan; null if nothing of the model is at its height. */
 export function boundsOfPlan(plan: GdbPlan | null): Box | null {
   let box: Box | null = null;
-  for (const { at_m: [x, y] } of plan === null ? [] : [...plan.outlines, ...plan.sheets].flat()) {
+  for (const { at_m: [x, y] } of plan === null ? [] : cornersOf(plan)) {
     box = union(box, [x, y, x, y]);
   }
   return box;
-}
-
-/** The landmark nearest to a place, if any is within `withinM`. */
-export function landmarkAt(landmarks: Iterable<Landmark>, at: Point, withinM: number): Landmark | null {
-  let best: Landmark | null = null;
-  let leastM = withinM;
-  for (const landmark of landmarks) {
-    const [x, y] = landmark.at_m;
-    const distanceM = Math.hypot(x - at[0], y - at[1]);
-    if (distanceM <= leastM) [best, leastM] = [landmark, distanceM];
-  }
-  return best;
 }
 
 /** Kinds of landmarks for people. */

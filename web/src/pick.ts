@@ -2,7 +2,6 @@
 // chains before walls before clusters before the rest of chains.
 
 import { distanceToPiece, edgesOf, hullContains, piecesOf, ringContains, type Point } from "./geometry";
-import { landmarkAt } from "./model";
 import { robotsHere, type Selection, type State } from "./state";
 
 /** How far from a thing still counts as on it. */
@@ -32,8 +31,10 @@ function pickRobot(state: State, at: Point, withinM: number): Selection | null {
 }
 
 function pickLandmark(state: State, at: Point, withinM: number): Selection | null {
-  const found = landmarkAt(state.model.landmarks.values(), at, withinM);
-  return found === null ? null : { kind: "landmark", id: found.id };
+  return nearest(
+    [...state.model.landmarks.values()].map(({ id, at_m: [x, y] }) => ({ id, distanceM: Math.hypot(x - at[0], y - at[1]) })),
+    { kind: "landmark", withinM },
+  );
 }
 
 function pickSegment(state: State, at: Point, withinM: number): Selection | null {

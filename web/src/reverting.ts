@@ -3,7 +3,8 @@
 
 import { inWords, isAborted, Refused, type Api } from "./api";
 import { NO_LOG, previewInWords, targetsOf, type LogState, type Trial } from "./reverts";
-import type { State } from "./state";
+import { hasEnded } from "./session";
+import { may, type State } from "./state";
 import type { Dispatch } from "./store";
 import { counted } from "./words";
 
@@ -46,11 +47,7 @@ export function createLogActions({ api, state, dispatch, uuid }: LogActionsOptio
     dispatch({ kind: "log", log });
   };
   const failed = (error: unknown): void => {
-    if (isAborted(error)) return;
-    if (error instanceof Refused && error.status === 401) {
-      dispatch({ kind: "session", session: { kind: "out", problem: "Your session has ended. Sign in again." } });
-      return;
-    }
+    if (isAborted(error) || hasEnded(error, dispatch)) return;
     // What the server refuses for good must be tried out again; what it cannot do now, only sent again.
     const overtaken = error instanceof Refused && error.status < 500;
     change({ busy: null, problem: inWords(error), ...(overtaken ? { preview: null } : {}) });
@@ -176,8 +173,8 @@ export function createLogActions({ api, state, dispatch, uuid }: LogActionsOptio
 }
 
 /** Whether who is signed in may take contributions out. */
-export function mayRevert({ session }: State): boolean {
-  return session.kind === "in" && session.who.scopes.some((scope) => scope === "map:edit" || scope === "admin");
+export function mayRevert(state: State): boolean {
+  return may(state, "map:edit");
 }
 
 /** What was tried out, in words; empty if nothing was. */

@@ -3,6 +3,13 @@
 import { inWords, Refused, type Api } from "./api";
 import type { Dispatch } from "./store";
 
+/** Whether a failure is that the session has ended; the page then asks for a token again. */
+export function hasEnded(error: unknown, dispatch: Dispatch): boolean {
+  const ended = error instanceof Refused && error.status === 401;
+  if (ended) dispatch({ kind: "session", session: { kind: "out", problem: "Your session has ended. Sign in again." } });
+  return ended;
+}
+
 /** Signs in with a token and lists the sites. */
 export async function signIn(api: Api, dispatch: Dispatch, token: string): Promise<void> {
   dispatch({ kind: "session", session: { kind: "signing-in" } });
@@ -46,10 +53,6 @@ export async function listSites(api: Api, dispatch: Dispatch): Promise<void> {
   try {
     dispatch({ kind: "sites", sites: await api.sites() });
   } catch (error) {
-    if (error instanceof Refused && error.status === 401) {
-      dispatch({ kind: "session", session: { kind: "out", problem: "Your session has ended. Sign in again." } });
-    } else {
-      dispatch({ kind: "session", session: { kind: "unreachable", problem: inWords(error) } });
-    }
+    if (!hasEnded(error, dispatch)) dispatch({ kind: "session", session: { kind: "unreachable", problem: inWords(error) } });
   }
 }

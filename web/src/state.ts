@@ -216,6 +216,11 @@ export function update(state: State, event: Event): State {
   }
 }
 
+/** Whether whoever is signed in may do what needs this scope. */
+export function may({ session }: State, scope: SessionDescription["scopes"][number]): boolean {
+  return session.kind === "in" && session.who.scopes.some((held) => held === scope || held === "admin");
+}
+
 /** Whether two places are the same. */
 export function samePlace(a: Place | null, b: Place | null): boolean {
   return a?.site === b?.site && a?.level === b?.level;

@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
-import { entryInWords, mayPublish, NO_DRAFT, placeOf, readiness, type DraftState } from "../src/drafts";
+import { mayPublish } from "../src/drafting";
+import { entryInWords, NO_DRAFT, placeOf, readiness, type DraftState } from "../src/drafts";
 import { initialState, update } from "../src/state";
 import type { GdbEntry, GdbFinding } from "../src/wire";
 import { NO_LINK, NOON_MS } from "./samples";

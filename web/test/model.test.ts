@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { boundsOfPlan, isRead, landmarkAt, NO_MODEL } from "../src/model";
+import { boundsOfPlan, isRead, NO_MODEL } from "../src/model";
 import { pick } from "../src/pick";
 import { describe as inWords } from "../src/panels/selection_card";
 import { update, type State } from "../src/state";
@@ -34,8 +34,9 @@ describe("the a-priori model", () => {
   });
 
   it("finds the landmark nearest to a place", () => {
-    expect(landmarkAt(landmarks.values(), [28.1, 1.4], 0.2)?.id).toBe("end");
-    expect(landmarkAt(landmarks.values(), [28.1, 1.1], 0.2)).toBeNull();
+    // Lines and landmarks are met within 8 pixels: 20 cm.
+    expect(pick(withModel(), [28.1, 1.4], 0.025)).toEqual({ kind: "landmark", id: "end" });
+    expect(pick(withModel(), [28.1, 1.1], 0.025)?.kind).not.toBe("landmark");
   });
 
   it("keeps the height with another level, and forgets the rest", () => {

@@ -1,8 +1,8 @@
 // The a-priori model of the level: who edited it, what is wrong with its draft, and handing it to the robots.
 
-import { entryInWords, entryProvenance, mayPublish, placeOf, readiness, READINESS_WORDS } from "../drafts";
-import type { DraftActions } from "../drafting";
-import { el, keyed, setShown, setText, type Row } from "../dom";
+import { mayPublish, type DraftActions } from "../drafting";
+import { entryInWords, entryProvenance, placeOf, readiness, READINESS_WORDS } from "../drafts";
+import { el, keyed, logRow, setShown, setText } from "../dom";
 import type { State } from "../state";
 import type { Store } from "../store";
 import type { GdbEntry, GdbFinding } from "../wire";
@@ -22,7 +22,7 @@ export function createModelCard(parent: HTMLElement, { store, actions }: { store
   const findings = el("ul", { class: "findings", attrs: { "aria-label": "What is wrong with the draft" } });
   const more = el("p", { class: "hint" });
   const list = el("ul", { class: "imports", attrs: { "aria-label": "Edits and publications, newest first" } });
-  const drawEntries = keyed<GdbEntry>(list, { key: ({ id }) => id, make: createEntryRow });
+  const drawEntries = keyed<GdbEntry>(list, { key: ({ id }) => id, make: (entry) => logRow(entryInWords(entry), entryProvenance(entry)) });
   const details = el(
     "details",
     {
@@ -33,7 +33,7 @@ export function createModelCard(parent: HTMLElement, { store, actions }: { store
       },
     },
     el("summary", {}, el("h2", { text: "Model" })),
-    el("div", { class: "model-head" }, now, publish),
+    el("div", { class: "folding-head" }, now, publish),
     barred,
     problem,
     done,
@@ -41,7 +41,7 @@ export function createModelCard(parent: HTMLElement, { store, actions }: { store
     more,
     list,
   );
-  parent.append(el("section", { class: "card model-card" }, details));
+  parent.append(el("section", { class: "card folding model-card" }, details));
   let drawn: readonly GdbFinding[] | null = null;
 
   return (state) => {
@@ -85,14 +85,4 @@ function createFinding(finding: GdbFinding, store: Store): HTMLElement {
     },
   });
   return el("li", {}, severity, text, show);
-}
-
-function createEntryRow(entry: GdbEntry): Row<GdbEntry> {
-  const element = el(
-    "li",
-    {},
-    el("span", { class: "name", text: entryInWords(entry) }),
-    el("span", { class: "what", text: entryProvenance(entry) }),
-  );
-  return { element, draw: () => undefined };
 }

@@ -1,7 +1,7 @@
 // The prior of the level: a map of another program below what robots see. Who may edit hands one in
 // here, after seeing what the server read in it, or takes it away.
 
-import { el, keyed, setShown, setText, type Row } from "../dom";
+import { el, keyed, logRow, setShown, setText } from "../dom";
 import { importInWords, priorOf, provenanceInWords, reportInWords } from "../imports";
 import type { ImportActions } from "../importing";
 import { mayRevert } from "../reverting";
@@ -81,7 +81,7 @@ export function createPriorCard(parent: HTMLElement, actions: ImportActions): (s
   const now = el("p", { class: "prior-now" });
   const remove = el("button", { text: "Take away", attrs: { type: "button", id: "prior-remove" }, on: { click: actions.remove } });
   const list = el("ul", { class: "imports", attrs: { "aria-label": "Imports, newest first" } });
-  const drawList = keyed<Import>(list, { key: ({ id }) => id, make: createRow });
+  const drawList = keyed<Import>(list, { key: ({ id }) => id, make: (made) => logRow(importInWords(made), provenanceInWords(made)) });
   const details = el(
     "details",
     {
@@ -92,7 +92,7 @@ export function createPriorCard(parent: HTMLElement, actions: ImportActions): (s
       },
     },
     el("summary", {}, el("h2", { text: "Prior" })),
-    el("div", { class: "prior-head" }, now, remove),
+    el("div", { class: "folding-head" }, now, remove),
     form,
     barred,
     busy,
@@ -100,7 +100,7 @@ export function createPriorCard(parent: HTMLElement, actions: ImportActions): (s
     done,
     list,
   );
-  parent.append(el("section", { class: "card prior-card" }, details));
+  parent.append(el("section", { class: "card folding prior-card" }, details));
   let drawn: unknown = null;
   let place = "";
 
@@ -142,14 +142,4 @@ export function createPriorCard(parent: HTMLElement, actions: ImportActions): (s
     }
     drawList(imports.imports ?? []);
   };
-}
-
-function createRow(made: Import): Row<Import> {
-  const element = el(
-    "li",
-    {},
-    el("span", { class: "name", text: importInWords(made) }),
-    el("span", { class: "what", text: provenanceInWords(made) }),
-  );
-  return { element, draw: () => undefined };
 }
