@@ -208,16 +208,38 @@ pub(super) fn created<T: Serialize>(
     location: Option<&str>,
     value: &T,
 ) -> Result<Response, ApiError> {
-    // The thing is made: an answer in a form the client did not ask for beats a refusal.
-    let media_type = reader.choose(DATA).unwrap_or(codec::JSON);
-    let content_type = [(CONTENT_TYPE, HeaderValue::from_static(media_type))];
-    let body = codec::encode(media_type, value)?;
-    let mut response = (StatusCode::CREATED, content_type, body).into_response();
+    let mut response = happened(reader, StatusCode::CREATED, value)?;
     response.headers_mut().insert(CACHE_CONTROL, HeaderValue::from_static("no-store"));
     if let Some(location) = location.and_then(|l| HeaderValue::from_str(l).ok()) {
         response.headers_mut().insert(LOCATION, location);
     }
     Ok(response)
+}
+
+/// The answer to a change, with the tag of what it made.
+pub(super) fn tagged<T: Serialize>(
+    reader: &Reader,
+    status: StatusCode,
+    value: &T,
+    tag: &Tag,
+) -> Result<Response, ApiError> {
+    let mut response = happened(reader, status, value)?;
+    if let Some(tag) = tag.header() {
+        response.headers_mut().insert(ETAG, tag);
+    }
+    Ok(response)
+}
+
+/// What has happened, in the form that the client likes.
+fn happened<T: Serialize>(
+    reader: &Reader,
+    status: StatusCode,
+    value: &T,
+) -> Result<Response, ApiError> {
+    // It cannot be taken back: an answer in a form the client did not ask for beats a refusal.
+    let media_type = reader.choose(DATA).unwrap_or(codec::JSON);
+    let content_type = [(CONTENT_TYPE, HeaderValue::from_static(media_type))];
+    Ok((status, content_type, codec::encode(media_type, value)?).into_response())
 }
 
 fn validators(headers: &mut HeaderMap, tag: &Tag) {

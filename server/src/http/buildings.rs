@@ -5,12 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use axum::body::Bytes;
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::Response;
-use mapfold_schema::v1::{BuildingImport, GdbAnswer};
+use mapfold_schema::v1::BuildingImport;
 
 use super::access::{Edit, LevelFor};
 use super::answer::{Reader, blocking};
-use super::gdb::{Asked, columns, concluded, new_entry, tagged, tell};
-use super::preconditions::{IfMatch, version_tag};
+use super::gdb::{Asked, answer, columns, concluded, new_entry, tell};
+use super::preconditions::IfMatch;
 use super::problem::ApiError;
 use super::state::App;
 use crate::auth;
@@ -77,9 +77,9 @@ pub(super) async fn take(
     let comment: String = comment.chars().filter(|c| !c.is_control()).take(120).collect();
     let new = new_entry(app, auth::granted_by(&level.caller), &comment, expected);
     let outcome = level.level.edit_gdb(&new, &asked.change).await?;
-    let (version, entry) = concluded(outcome, asked.named)?;
-    let status = if entry.is_some() { StatusCode::CREATED } else { StatusCode::OK };
-    let answer = GdbAnswer { draft: version.draft, library: version.library, entry };
-    let made = BuildingImport { report, preview: None, answer: Some(answer) };
-    tagged(reader, status, &made, &version_tag(version, ""))
+    answer(reader, concluded(outcome, asked.named)?, StatusCode::CREATED, |answer| BuildingImport {
+        report,
+        preview: None,
+        answer: Some(answer),
+    })
 }

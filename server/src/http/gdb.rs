@@ -4,9 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use axum::extract::{Request, State};
-use axum::http::header::ETAG;
 use axum::http::{HeaderMap, StatusCode};
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use mapfold_map::gdb::Severity;
 use mapfold_schema::border::gdb::{
     CONFORMS_TO, check_edit, check_gdb, coord_ref_sys, object_id, object_uuid, wire_feature,
@@ -14,8 +13,7 @@ use mapfold_schema::border::gdb::{
 };
 use mapfold_schema::border::{VIOLATIONS_MAX, Violation};
 use mapfold_schema::v1::{
-    CollectionWord, GdbAnswer, GdbCollection, GdbEdit, GdbEdited, GdbEntry, GdbEntryPage,
-    GdbPreview,
+    CollectionWord, GdbAnswer, GdbCollection, GdbEdit, GdbEdited, GdbEntryPage, GdbPreview,
 };
 use mapfold_schema::{codec, geojson, route};
 use serde::Deserialize;
@@ -23,7 +21,7 @@ use serde::de::DeserializeOwned;
 use uuid::Uuid;
 
 use super::access::{Edit, LevelFor, Publish, Read};
-use super::answer::{FEATURES, Reader, blocking};
+use super::answer::{FEATURES, Reader, blocking, tagged};
 use super::body::{self, media_type};
 use super::check;
 use super::preconditions::{IfMatch, version_tag};
@@ -34,7 +32,7 @@ use super::state::App;
 use crate::auth;
 use crate::level::LevelHandle;
 use crate::level::gdb::{GdbModel, WireObjects, column};
-use crate::store::gdb::{Expected, GdbChange, GdbOutcome, GdbVersion, NewGdbEntry};
+use crate::store::gdb::{Expected, GdbChange, GdbOutcome, GdbState, GdbVersion, NewGdbEntry};
 
 /// Entries of a page, if the request names no number; and at most.
 const PAGE: u32 = 50;
@@ -294,7 +292,7 @@ async fn change<T: Asks>(
     }
     let new = new_entry(app, auth::granted_by(&level.caller), &query.comment, expected);
     let outcome = level.level.edit_gdb(&new, &asked.change).await?;
-    answer(reader, outcome, asked.named, StatusCode::OK)
+    answer(reader, concluded(outcome, asked.named)?, StatusCode::OK, |answer| answer)
 }
 
 /// Reads JSON (also under the names of GeoJSON and JSON-FG) or CBOR.
@@ -355,7 +353,8 @@ pub(super) async fn publish(
     }
     let new = new_entry(&app, auth::granted_by(&level.caller), &query.comment, expected);
     let outcome = level.level.publish_gdb(&new).await?;
-    answer(&reader, outcome, BTreeMap::new(), StatusCode::CREATED)
+    let concluded = concluded(outcome, BTreeMap::new())?;
+    answer(&reader, concluded, StatusCode::CREATED, |answer| answer)
 }
 
 fn without_errors(draft: &Arc<GdbModel>) -> Result<(), ApiError> {
@@ -394,50 +393,33 @@ pub(super) fn new_entry(app: &App, author: &str, comment: &str, expected: Expect
     }
 }
 
-/// What is there after a change, and the entry if there is one.
+/// What is there after a change, the entry if there is one; or why there is none.
 pub(super) fn concluded(
     outcome: GdbOutcome,
     named: BTreeMap<Uuid, String>,
-) -> Result<(GdbVersion, Option<GdbEntry>), ApiError> {
+) -> Result<GdbAnswer, ApiError> {
     match outcome {
         GdbOutcome::Done(entry) => {
-            Ok((GdbVersion { draft: entry.draft, library: entry.library }, Some(entry)))
+            Ok(GdbAnswer { draft: entry.draft, library: entry.library, entry: Some(entry) })
         }
-        GdbOutcome::Same(state) => Ok((state.draft, None)),
+        GdbOutcome::Same(GdbState { draft: GdbVersion { draft, library }, .. }) => {
+            Ok(GdbAnswer { draft, library, entry: None })
+        }
         GdbOutcome::Stale(stale) => Err(GdbRefusal::Stale { stale, named }.into()),
         GdbOutcome::TooMany { objects } => Err(GdbRefusal::TooMany { objects }.into()),
     }
 }
 
-/// The answer to a change, with the tag of what is there now.
-fn answer(
+/// The answer to a change, which `of` makes of what is there now, with the tag of that.
+pub(super) fn answer<T: serde::Serialize>(
     reader: &Reader,
-    outcome: GdbOutcome,
-    named: BTreeMap<Uuid, String>,
+    concluded: GdbAnswer,
     done: StatusCode,
+    of: impl FnOnce(GdbAnswer) -> T,
 ) -> Result<Response, ApiError> {
-    let (version, entry) = concluded(outcome, named)?;
-    let status = if entry.is_some() { done } else { StatusCode::OK };
-    let answer = GdbAnswer { draft: version.draft, library: version.library, entry };
-    tagged(reader, status, &answer, &version_tag(version, ""))
-}
-
-/// An answer to a change, with the tag of what it made.
-pub(super) fn tagged<T: serde::Serialize>(
-    reader: &Reader,
-    status: StatusCode,
-    value: &T,
-    tag: &super::answer::Tag,
-) -> Result<Response, ApiError> {
-    // It has happened: an answer in a form the client did not ask for beats a refusal.
-    let media_type = reader.choose(super::answer::DATA).unwrap_or(codec::JSON);
-    let body = codec::encode(media_type, value)?;
-    let content_type = [(axum::http::header::CONTENT_TYPE, media_type)];
-    let mut response = (status, content_type, body).into_response();
-    if let Some(tag) = tag.header() {
-        response.headers_mut().insert(ETAG, tag);
-    }
-    Ok(response)
+    let GdbAnswer { draft, library, .. } = concluded;
+    let status = if concluded.entry.is_some() { done } else { StatusCode::OK };
+    tagged(reader, status, &of(concluded), &version_tag(GdbVersion { draft, library }, ""))
 }
 
 /// Who changed and published the model, newest first, in pages.

@@ -10,9 +10,9 @@ use mapfold_schema::v1::{CollectionWord, GdbPrototype, PrototypeCollection};
 use mapfold_schema::{codec, route};
 
 use super::access::{Edit, Read, SiteFor};
-use super::answer::{FEATURES, Reader, blocking};
+use super::answer::{FEATURES, Reader, blocking, tagged};
 use super::body::{self, media_type};
-use super::gdb::{decode, new_entry, tagged};
+use super::gdb::{decode, new_entry};
 use super::preconditions::{IfMatch, library_tag};
 use super::problem::ApiError;
 use super::problem::gdb::GdbRefusal;
