@@ -5,11 +5,15 @@
 //! foreign member `coordinate_frame`. One feature a line, in the order of the features' ids, so
 //! that two exports can be compared by their bytes and by `diff`.
 
+mod model;
+
 use std::io::{self, Write};
 
+use mapfold_map::gdb::{Landmark, Plan};
 use mapfold_map::geometry::Line;
 use mapfold_map::level::LevelMap;
 use serde::Serialize;
+use uuid::Uuid;
 
 use crate::border::{wire_chain, wire_cluster, wire_segment};
 use crate::v1;
@@ -32,6 +36,7 @@ struct Feature<'a> {
 #[derive(Serialize)]
 #[serde(tag = "type", content = "coordinates")]
 enum Geometry {
+    Point([f64; 2]),
     LineString(Vec<[f64; 2]>),
     Polygon([Vec<[f64; 2]>; 1]),
 }
@@ -63,6 +68,22 @@ enum Properties<'a> {
         segments: &'a [String],
         robots: &'a [String],
     },
+    Plan {
+        id: &'a str,
+        kind: &'static str,
+        shape: model::PlanShape,
+        height_m: f64,
+        objects: &'a [Uuid],
+    },
+    Landmark {
+        id: &'a str,
+        kind: &'static str,
+        shape: v1::LandmarkKind,
+        heading_rad: f64,
+        covariance: [[f64; 3]; 3],
+        extent: f64,
+        objects: &'a [String],
+    },
 }
 
 /// Writes all segments, clusters and chains of a map.
@@ -70,15 +91,30 @@ enum Properties<'a> {
 /// # Errors
 /// What `to` cannot take.
 pub fn write_map(map: &LevelMap, to: &mut impl Write) -> io::Result<()> {
+    write(Some(map), None, to)
+}
+
+/// Writes a map, or the plan of a model with its landmarks, or both.
+///
+/// # Errors
+/// What `to` cannot take.
+pub fn write(
+    map: Option<&LevelMap>,
+    model: Option<(&Plan, &[Landmark])>,
+    to: &mut impl Write,
+) -> io::Result<()> {
     let mut features = Features::begin(to, "")?;
-    for (id, segment) in &map.segments {
+    for (id, segment) in map.iter().flat_map(|map| &map.segments) {
         features.segment(&wire_segment(id, segment))?;
     }
-    for (id, cluster) in &map.clusters {
+    for (id, cluster) in map.iter().flat_map(|map| &map.clusters) {
         features.cluster(&wire_cluster(id, cluster))?;
     }
-    for (id, chain) in &map.chains {
+    for (id, chain) in map.iter().flat_map(|map| &map.chains) {
         features.chain(&wire_chain(id, chain))?;
+    }
+    if let Some((plan, landmarks)) = model {
+        features.model(plan, landmarks)?;
     }
     features.end()
 }

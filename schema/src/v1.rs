@@ -9,6 +9,7 @@ mod gdb_log;
 mod import;
 mod jsonfg;
 mod level;
+mod model_file;
 mod patch;
 mod plan;
 mod receipt;
@@ -43,6 +44,7 @@ pub use jsonfg::{
     PrototypeFeature,
 };
 pub use level::{Bounds, Counts, LevelDescription, NewLevel};
+pub use model_file::{GdbDocument, KindCount, LeftOut, ModelFormat, ModelImport, ModelReport};
 pub use patch::{
     Patch, PriorTile, RasterChanges, Removed, TileAddress, TileEvidence, TilePlace, VectorPatch,
 };

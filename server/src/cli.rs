@@ -4,8 +4,10 @@
 mod args;
 mod backup;
 mod export;
+mod export_model;
 mod import;
 mod import_building;
+mod import_model;
 mod serve;
 mod token;
 mod verify;

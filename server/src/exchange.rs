@@ -5,11 +5,16 @@
 //! which mirrors write too, is in `mapfold_schema::geojson`.
 //!
 //! * [`building`]: a building of Open-RMF's traffic editor, in.
+//! * [`incoming`], [`outgoing`]: models of any format on their way in and out.
+//! * [`jsonfg`]: a model with its prototypes, whole, out and in.
 //! * [`layers`]: which layers a raster has, and where they are found.
 //! * [`nav2`]: the raster as `map.yaml` and an image, out and in.
 //! * [`png_tiles`]: the raster as a picture pyramid.
 
 pub mod building;
+pub mod incoming;
+pub mod jsonfg;
 pub mod layers;
 pub mod nav2;
+pub mod outgoing;
 pub mod png_tiles;

@@ -16,6 +16,8 @@ mod cap;
 mod check;
 mod layers;
 mod listen;
+mod model_exports;
+mod model_imports;
 mod observe;
 mod openapi;
 mod preconditions;

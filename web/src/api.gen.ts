@@ -148,10 +148,12 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * The whole map as a file: `geojson`, or `nav2` (a zip of `map.yaml` and `map.pgm` or `map.png`).
+         * The whole map as a file: `geojson`, or `nav2` (a zip of `map.yaml` and `map.pgm` or `map.png`). Or the a-priori
+         *     model: `jsonfg` (all of it, with the prototypes that it uses; `imports` takes it back without loss).
          * @description Equal maps give equal bytes. GeoJSON has a `LineString` for each solid part of a segment (with
          *     the feature id `<segment id>#<n>`), a `Polygon` for each cluster and the one or the other for each
-         *     chain, in metres of the level. A nav2 map can be had in every mode of `map_server`, of each layer,
+         *     chain, in metres of the level; of the model, the outlines (`Polygon`), sheets and openings (`LineString`) that a sensor
+         *     at a height would see, and the landmarks there (`Point`). A nav2 map can be had in every mode of `map_server`, of each layer,
          *     and of a rectangle; its yaw is 0, and its numbers are written in full.
          */
         get: operations["export"];
@@ -323,6 +325,10 @@ export interface paths {
          *     A `building.yaml` of Open-RMF's traffic editor, as `application/yaml`, goes into the draft of the GDB instead: walls,
          *     doorways and floors of one of its levels, and models that the site has prototypes of; the answer is a
          *     `BuildingImport`. The same file gives the same objects. `If-Match` may name the draft that it is taken on.
+         *
+         *     A model as JSON-FG (`application/fg+json`: a `GdbDocument`, as `exports/jsonfg` gives it) goes there too, and its prototypes
+         *     into the library of the site, of which no prototype is changed: one whose name is taken gets a name of its own. The
+         *     answer is a `ModelImport`, which tells what was left out, and why.
          */
         post: operations["import"];
         /**
@@ -1084,6 +1090,32 @@ export interface components {
              */
             upper_m: number;
         };
+        /**
+         * @description A model with the prototypes that its instances are of, as JSON-FG: what `exports/jsonfg` gives, and `imports` takes
+         *     back without loss, into any level.
+         */
+        GdbDocument: {
+            /** @description Which parts of JSON-FG are used. */
+            conformsTo?: string[];
+            /** @description The frame of the level that it was taken from, metres. Coordinates of another level are taken as those of this one. */
+            coordRefSys?: Record<string, never> | null;
+            /** @description The objects, by identity. */
+            features: components["schemas"]["GdbFeature"][];
+            /**
+             * Format: int64
+             * @description The library that it was written from; not read.
+             */
+            library?: number | null;
+            /** @description The prototypes that instances may name; others are those of the site. */
+            prototypes?: components["schemas"]["PrototypeFeature"][];
+            /**
+             * Format: int64
+             * @description The draft that it was written from; not read.
+             */
+            revision?: number | null;
+            /** @description `FeatureCollection`. */
+            type: components["schemas"]["CollectionWord"];
+        };
         /** @description `PATCH L/gdb`: some objects put in the place of what they were, others taken away. */
         GdbEdit: {
             /** @description New objects, and those that change, whole. */
@@ -1492,6 +1524,16 @@ export interface components {
             /** @description What goes into `Authorization: Bearer`. */
             token: string;
         };
+        /** @description Objects of one kind. */
+        KindCount: {
+            /**
+             * Format: int32
+             * @description How many there are.
+             */
+            count: number;
+            /** @description What they are. */
+            kind: components["schemas"]["ObjectKind"];
+        };
         /** @description A landmark: what robots find themselves by. */
         Landmark: {
             /** @description Where it is. */
@@ -1574,6 +1616,18 @@ export interface components {
              */
             y_m: number;
         };
+        /** @description Things in a file that are not taken. */
+        LeftOut: {
+            /**
+             * Format: int32
+             * @description How many.
+             */
+            count: number;
+            /** @description What they are, and where. */
+            what: string;
+            /** @description Why. */
+            why: string;
+        };
         /** @description A level as it is. */
         LevelDescription: {
             bounds?: components["schemas"]["Bounds"] | null;
@@ -1650,6 +1704,42 @@ export interface components {
              * @description Number of changed or removed tiles.
              */
             tiles: number;
+        };
+        /**
+         * @description Formats that a model comes in as.
+         * @enum {string}
+         */
+        ModelFormat: "jsonfg";
+        /** @description The answer to the import of a model: what was found, and what became of it. */
+        ModelImport: {
+            answer?: components["schemas"]["GdbAnswer"] | null;
+            preview?: components["schemas"]["GdbPreview"] | null;
+            /** @description What was found. */
+            report: components["schemas"]["ModelReport"];
+        };
+        /** @description What was found in a file of a model. */
+        ModelReport: {
+            bounds?: components["schemas"]["Bounds"] | null;
+            /** @description The format. */
+            format: components["schemas"]["ModelFormat"];
+            /**
+             * Format: int32
+             * @description Those of them that are instances of prototypes.
+             */
+            instances: number;
+            /** @description Objects by kind. */
+            kinds: components["schemas"]["KindCount"][];
+            /** @description What is not taken, and why. */
+            left_out: components["schemas"]["LeftOut"][];
+            /** @description Prototypes that the site's library does not have and gets, by the names that they get. */
+            prototypes: string[];
+            /**
+             * Format: double
+             * @description Metres of one unit of the file.
+             */
+            scale_m: number;
+            /** @description What is doubtful about it, in words. */
+            warnings: string[];
         };
         /** @description A level to be made. */
         NewLevel: {
@@ -3047,12 +3137,18 @@ export interface operations {
                 layer?: "all" | "scanner" | "sonar" | "prior" | "walls";
                 /** @description `nav2`: only the cells that touch this rectangle, `min_x,min_y,max_x,max_y` in metres. */
                 bbox?: string;
+                /** @description `geojson`: `map` (what robots saw, the default), `gdb` (the plan of the a-priori model, and its landmarks) or `all`. */
+                of?: "map" | "gdb" | "all";
+                /** @description `jsonfg`, and `geojson` of the model: `draft` (if absent) or `published`. */
+                state?: "draft" | "published";
+                /** @description `geojson` of the model: the height that it is cut at; 0.3 if absent. */
+                height_m?: number;
             };
             header?: never;
             path: {
                 site: string;
                 level: string;
-                /** @description `geojson` or `nav2` */
+                /** @description `geojson`, `nav2` or `jsonfg` */
                 format: string;
             };
             cookie?: never;
@@ -3066,6 +3162,7 @@ export interface operations {
                 };
                 content: {
                     "application/geo+json": Record<string, never>;
+                    "application/fg+json": components["schemas"]["GdbDocument"];
                     "application/zip": number[];
                 };
             };
@@ -3617,7 +3714,7 @@ export interface operations {
                 trust?: number;
                 /** @description Of a building: which of its levels; the only one if absent. */
                 building_level?: string;
-                /** @description Of a building, `true`: what is in the draft of the GDB and not in the building goes. */
+                /** @description Of a building or a model, `true`: what is in the draft of the GDB and not in the file goes. */
                 replace?: boolean;
             };
             header?: never;
@@ -3660,7 +3757,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description `invalid_map_package`, `invalid_map_metadata`, `invalid_map_data`, `invalid_building`: what is wrong, where, and what to do */
+            /** @description `invalid_map_package`, `invalid_map_metadata`, `invalid_map_data`, `invalid_building`, `invalid_model_file`: what is wrong, where, and what to do */
             422: {
                 headers: {
                     [name: string]: unknown;

@@ -3,7 +3,7 @@
 use super::exact::{PlanPoint, REACH, micrometres};
 use super::mesh::Mesh;
 use super::shell::is_sound;
-use super::{Kind, Model, Object, ObjectId, Placement, Solid};
+use super::{Kind, Model, Object, ObjectId, Placement, Point3, Solid};
 
 /// An object with its solids where they stand.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +32,17 @@ impl Structure {
             Standing::of(*id, object, solids)
         });
         Self { standing: standing.collect() }
+    }
+
+    /// The smallest and the greatest coordinates of all that stands, metres; `None` if nothing does.
+    pub fn extent(&self) -> Option<[Point3; 2]> {
+        let all: Vec<_> = self.standing.iter().filter_map(Standing::bounds).collect();
+        let lower = |k: usize| all.iter().map(|[from, _]| from[k]).min();
+        let upper = |k: usize| all.iter().map(|[_, to]| to[k]).max();
+        let metres = |value: Option<i64>| Some(value? as f64 / super::MICROMETRES);
+        let from = Point3::new(metres(lower(0))?, metres(lower(1))?, metres(lower(2))?);
+        let to = Point3::new(metres(upper(0))?, metres(upper(1))?, metres(upper(2))?);
+        Some([from, to])
     }
 
     /// Heights between which something stands, metres; `None` if nothing does.

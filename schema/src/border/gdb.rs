@@ -3,6 +3,7 @@
 //! What gets in can be stored and drawn; whether it is right (closed, plane, not overlapping) is said by
 //! findings, since a draft may hold faults.
 
+mod document;
 mod findings;
 mod place;
 mod plan;
@@ -13,6 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use mapfold_map::gdb::{Object, ObjectId, Placement, Point3, Prototype, PrototypeName, Shape};
 use uuid::Uuid;
 
+pub use document::{CheckedDocument, check_document};
 pub use findings::{finding_code, wire_finding};
 pub use plan::{landmark_id, wire_gdb_landmark, wire_plan};
 pub use solids::vertex_count;
@@ -142,23 +144,30 @@ pub fn check_library(
     collection: &v1::PrototypeCollection,
 ) -> Result<BTreeMap<String, v1::GdbPrototype>, Vec<Violation>> {
     let mut wrong = Violations::default();
-    let root = Place::Root;
-    let at = root.field("features");
-    if collection.features.len() > PROTOTYPES_MAX {
-        wrong.add(&at, "too_many", format_args!("a site has at most {PROTOTYPES_MAX} prototypes"));
+    let library = prototypes(&collection.features, &Place::Root.field("features"), &mut wrong);
+    wrong.none_or(Some(library))
+}
+
+fn prototypes(
+    features: &[v1::PrototypeFeature],
+    at: &Place<'_>,
+    wrong: &mut Violations,
+) -> BTreeMap<String, v1::GdbPrototype> {
+    if features.len() > PROTOTYPES_MAX {
+        wrong.add(at, "too_many", format_args!("a site has at most {PROTOTYPES_MAX} prototypes"));
     }
     let (mut library, mut vertices) = (BTreeMap::new(), 0);
-    for (index, feature) in collection.features.iter().take(PROTOTYPES_MAX).enumerate() {
+    for (index, feature) in features.iter().take(PROTOTYPES_MAX).enumerate() {
         let at = at.index(index);
-        name(&feature.id, &at.field("id"), &mut wrong);
+        name(&feature.id, &at.field("id"), wrong);
         if feature.id.trim().is_empty() {
             wrong.add(&at.field("id"), "bad_name", "a prototype has a name");
         }
         let properties = at.field("properties");
-        let checked = prototype(&feature.properties, &properties, &mut wrong);
+        let checked = prototype(&feature.properties, &properties, wrong);
         if let (Some(prototype), Some(given)) = (&checked, &feature.place) {
             let derived = place::geometry_of(&prototype.solids, &Placement::identity());
-            same_place(given, derived.as_ref(), &at.field("place"), &mut wrong);
+            same_place(given, derived.as_ref(), &at.field("place"), wrong);
         }
         vertices += checked.iter().flat_map(|p| &p.solids).map(vertex_count).sum::<usize>();
         if library.insert(feature.id.clone(), feature.properties.clone()).is_some() {
@@ -166,9 +175,9 @@ pub fn check_library(
         }
     }
     if vertices > VERTICES_MAX {
-        wrong.add(&at, "too_many", format_args!("{VERTICES_MAX} vertices are the most"));
+        wrong.add(at, "too_many", format_args!("{VERTICES_MAX} vertices are the most"));
     }
-    wrong.none_or(Some(library))
+    library
 }
 
 /// An object as the map has it.

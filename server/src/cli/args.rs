@@ -59,7 +59,7 @@ pub(super) enum Command {
     Token(TokenCommand),
     /// Write a level's map as a file of another program
     Export(ExportCommand),
-    /// Make a map of another program the prior of a level, below what robots saw; or take a building into its model
+    /// Make a map of another program the prior of a level, below what robots saw; or take a building or a model into its draft
     Import(ImportCommand),
     /// Refold the log and compare it with what is stored; fails if anything differs
     Verify(VerifyCommand),
@@ -135,13 +135,23 @@ pub(super) struct ExportCommand {
     /// The file to write; for nav2 the YAML, with the image beside it: `floor.pgm` for `floor.yaml`
     #[arg(long, value_name = "FILE")]
     pub(super) out: PathBuf,
+    /// Of geojson: what it shows [default: map]
+    #[arg(long, value_enum)]
+    pub(super) of: Option<ContentName>,
+    /// Of models: which one [default: draft]
+    #[arg(long, value_enum)]
+    pub(super) state: Option<StateName>,
+    /// Of geojson of a model: the height that it is cut at [default: 0.3]
+    #[arg(long)]
+    pub(super) height_m: Option<f64>,
     #[command(flatten)]
     pub(super) nav2: Nav2Options,
 }
 
 #[derive(Debug, Args)]
 pub(super) struct ImportCommand {
-    /// The YAML of a `map_server` map, with its image beside it; or a zip of both; or a `*.building.yaml` of Open-RMF
+    /// The YAML of a `map_server` map, with its image beside it; or a zip of both; or a `*.building.yaml` of Open-RMF; or a
+    /// model as JSON-FG (`*.json`)
     pub(super) file: PathBuf,
     /// Slug of the site
     #[arg(long)]
@@ -155,7 +165,7 @@ pub(super) struct ImportCommand {
     /// Of a building: which of its levels [default: the only one]
     #[arg(long, value_name = "NAME")]
     pub(super) building_level: Option<String>,
-    /// Of a building: take away what is in the draft and not in the building
+    /// Of a building or a model: take away what is in the draft and not in the file
     #[arg(long)]
     pub(super) replace: bool,
     /// Only tell what is in it
@@ -220,12 +230,32 @@ pub(super) enum LayerName {
     Walls,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum ExportFormat {
-    /// Segments, clusters and chains in metres
+    /// Segments, clusters and chains in metres; or the plan of the model, with its landmarks
     Geojson,
     /// A YAML and an image, as `map_server` reads them
     Nav2,
+    /// The model, with the prototypes that it uses, whole
+    Jsonfg,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum ContentName {
+    /// What robots saw
+    Map,
+    /// The plan of the a-priori model, and its landmarks
+    Gdb,
+    /// Both
+    All,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum StateName {
+    /// What people work on
+    Draft,
+    /// What robots get
+    Published,
 }
 
 #[derive(Debug, Args)]

@@ -10,8 +10,10 @@ use std::time::Duration;
 use mapfold_map::raster::SensorClass;
 use mapfold_schema::geojson;
 
-use super::args::{ExportCommand, ExportFormat, ImageName, LayerName, ModeName, Nav2Options};
-use super::{CommandError, say};
+use super::args::{
+    ContentName, ExportCommand, ExportFormat, ImageName, LayerName, ModeName, Nav2Options,
+};
+use super::{CommandError, export_model, say};
 use crate::clock::SystemClock;
 use crate::config::Config;
 use crate::exchange::layers::{Layer, LayerId};
@@ -35,7 +37,15 @@ pub(super) async fn run(
         .ok_or_else(|| CommandError::Refused(format!("there is no level {site:?}/{name:?}")))?;
     let newest = level.snapshot().revision();
     let snapshot = level.snapshot_at(newest, PATIENCE).await;
-    let written = write(&snapshot, command);
+    let of_model = !matches!(command.of, None | Some(ContentName::Map));
+    let is_model = of_model || command.format == ExportFormat::Jsonfg;
+    let written = if is_model {
+        export_model::write(&store, &level, &snapshot, command).await
+    } else if command.state.is_some() || command.height_m.is_some() {
+        Err(CommandError::Refused("--state and --height-m are of models only".to_owned()))
+    } else {
+        write(&snapshot, command)
+    };
     drop((level, snapshot));
     levels.shutdown().await;
     store.close().await;
@@ -44,6 +54,7 @@ pub(super) async fn run(
 
 fn write(snapshot: &Snapshot, command: &ExportCommand) -> Result<ExitCode, CommandError> {
     match command.format {
+        ExportFormat::Jsonfg => {}
         ExportFormat::Geojson if !command.nav2.is_empty() => {
             let words = "geojson takes none of --mode, --image, --layer and --bbox";
             return Err(CommandError::Refused(words.to_owned()));
@@ -73,7 +84,7 @@ fn write(snapshot: &Snapshot, command: &ExportCommand) -> Result<ExitCode, Comma
 }
 
 impl Nav2Options {
-    fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         matches!(self, Self { mode: None, image: None, layer: None, bbox: None })
     }
 
@@ -119,7 +130,7 @@ fn image_beside(yaml: &Path, format: ImageFormat) -> PathBuf {
 }
 
 /// Writes a file whole: under another name first, so that nobody ever reads half of it.
-fn to_file(
+pub(super) fn to_file(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
 ) -> Result<(), CommandError> {

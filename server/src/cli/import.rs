@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use mapfold_schema::v1::ImportReport;
 
 use super::args::ImportCommand;
-use super::{CommandError, import_building, say};
+use super::{CommandError, import_building, import_model, say};
 use crate::chance::Chance;
 use crate::clock::{Clock as _, SystemClock};
 use crate::config::Config;
@@ -26,10 +26,17 @@ pub(super) async fn run(
     if is_building(&command.file) {
         return import_building::run(config, command).await;
     }
-    if command.building_level.is_some() || command.replace {
-        return Err(refused(
-            "--building-level and --replace are of buildings (*.building.yaml) only",
-        ));
+    if command.building_level.is_some() {
+        return Err(refused("--building-level is of buildings (*.building.yaml) only"));
+    }
+    if let Some(format) = import_model::format_of(&command.file) {
+        if command.trust.is_some() {
+            return Err(refused("--trust is of map_server's maps only"));
+        }
+        return import_model::run(config, command, format).await;
+    }
+    if command.replace {
+        return Err(refused("--replace is of buildings and models only"));
     }
     let trust = command.trust.map_or(Some(Trust::STANDARD), Trust::new);
     let trust = trust.ok_or_else(|| refused("--trust is from 0 to 1"))?;

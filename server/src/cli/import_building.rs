@@ -19,7 +19,7 @@ use crate::running::{StartError, open_existing_store};
 use crate::store::gdb::{Expected, GdbChange, GdbOutcome, NewGdbEntry};
 
 /// Findings that are told one by one.
-const TOLD_MAX: usize = 10;
+pub(super) const TOLD_MAX: usize = 10;
 
 pub(super) async fn run(
     config: &Config,
@@ -82,7 +82,7 @@ pub(super) async fn run(
     Ok(ExitCode::SUCCESS)
 }
 
-fn unreadable(error: GdbError) -> CommandError {
+pub(super) fn unreadable(error: GdbError) -> CommandError {
     match error {
         GdbError::Store(error) => error.into(),
         other => refused(other.to_string()),

@@ -63,15 +63,13 @@ impl Tag {
     }
 
     /// By all that the bytes depend on: for files that would be dear to write only to compare.
-    fn of_revision(frame: Uuid, revision: i64, target: &str, media_type: &str) -> Self {
-        let digest = Sha256::new()
-            .chain_update(env!("CARGO_PKG_VERSION"))
-            .chain_update(frame)
-            .chain_update(revision.to_le_bytes())
-            .chain_update(media_type)
-            .chain_update([0])
-            .chain_update(target)
-            .finalize();
+    fn of_revisions(frame: Uuid, revisions: &[i64], target: &str, media_type: &str) -> Self {
+        let mut digest = Sha256::new().chain_update(env!("CARGO_PKG_VERSION")).chain_update(frame);
+        for revision in revisions {
+            digest.update(revision.to_le_bytes());
+        }
+        let digest =
+            digest.chain_update(media_type).chain_update([0]).chain_update(target).finalize();
         Self::of_digest(&digest)
     }
 }
@@ -116,6 +114,9 @@ impl Reader {
             1 => first,
             2 if offer == FEATURES => "application/geo+json or application/json",
             2 => "application/json or application/cbor",
+            3 if first == "application/fg+json" => {
+                "application/fg+json, application/geo+json or application/json"
+            }
             _ => "application/json, application/cbor or application/geo+json",
         };
         best.1.ok_or(ApiError::NotAcceptable(offered))
@@ -163,16 +164,16 @@ impl Reader {
         Ok(at_revision(self.bytes(media_type, &tag, || bytes), revision))
     }
 
-    /// Answers with a file that the map at one revision determines byte for byte, written only if
-    /// the client does not have it.
-    pub(super) async fn file(
+    /// Answers with a file that some `revisions` determine byte for byte, written only if the client does not have it.
+    pub(super) async fn file_of(
         &self,
         frame: Uuid,
+        revisions: &[i64],
         revision: i64,
         media_type: &'static str,
         write: impl FnOnce() -> Result<Vec<u8>, ApiError> + Send + 'static,
     ) -> Result<Response, ApiError> {
-        let tag = Tag::of_revision(frame, revision, &self.target, media_type);
+        let tag = Tag::of_revisions(frame, revisions, &self.target, media_type);
         let bytes = if self.has(&tag) { Vec::new() } else { blocking(write).await? };
         Ok(at_revision(self.bytes(media_type, &tag, || bytes), revision))
     }
@@ -322,12 +323,12 @@ mod tests {
     #[test]
     fn a_tag_changes_with_all_that_the_bytes_depend_on() {
         let (a, b) = (Uuid::from_u128(1), Uuid::from_u128(2));
-        let tag = Tag::of_revision(a, 1, "/x?since=0", "application/json");
+        let tag = Tag::of_revisions(a, &[1], "/x?since=0", "application/json");
         for other in [
-            Tag::of_revision(b, 1, "/x?since=0", "application/json"),
-            Tag::of_revision(a, 2, "/x?since=0", "application/json"),
-            Tag::of_revision(a, 1, "/x?since=1", "application/json"),
-            Tag::of_revision(a, 1, "/x?since=0", "application/cbor"),
+            Tag::of_revisions(b, &[1], "/x?since=0", "application/json"),
+            Tag::of_revisions(a, &[2], "/x?since=0", "application/json"),
+            Tag::of_revisions(a, &[1], "/x?since=1", "application/json"),
+            Tag::of_revisions(a, &[1], "/x?since=0", "application/cbor"),
         ] {
             assert_ne!(tag, other);
         }

@@ -8,13 +8,16 @@ use axum::http::header::CONTENT_DISPOSITION;
 use axum::response::Response;
 use mapfold_schema::geojson;
 use mapfold_schema::route;
-use mapfold_schema::v1::Bounds;
+use mapfold_schema::v1::{Bounds, GdbDocument};
 use serde::Deserialize;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
 use super::access::{LevelFor, Read};
 use super::answer::Reader;
+use super::gdb::StateName;
+use super::model_exports::{self, Content as Shown, Format};
+use super::plan::height;
 use super::problem::ApiError;
 use super::query::{QueryOf, bbox};
 use super::state::App;
@@ -45,7 +48,7 @@ enum ImageName {
     Png,
 }
 
-/// What of a map is written, and how; of `nav2` only.
+/// What is written, and how. What a format does not know is refused.
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
@@ -63,11 +66,34 @@ pub(super) struct ExportQuery {
     #[serde(default, deserialize_with = "bbox")]
     #[param(value_type = Option<String>)]
     bbox: Option<Bounds>,
+    /// `geojson`: `map` (what robots saw, the default), `gdb` (the plan of the a-priori model, and its landmarks) or `all`.
+    #[param(inline)]
+    of: Option<Shown>,
+    /// `jsonfg`, and `geojson` of the model: `draft` (if absent) or `published`.
+    #[param(inline)]
+    state: Option<StateName>,
+    /// `geojson` of the model: the height that it is cut at; 0.3 if absent.
+    height_m: Option<f64>,
 }
 
 impl ExportQuery {
-    fn is_empty(&self) -> bool {
-        matches!(self, Self { mode: None, image: None, layer: None, bbox: None })
+    fn is_of_nav2(&self) -> bool {
+        !matches!(self, Self { mode: None, image: None, layer: None, bbox: None, .. })
+    }
+
+    /// Whether nothing is asked that this format does not know.
+    fn fits(&self, format: FormatName) -> bool {
+        let of_model = self.state.is_some() || self.height_m.is_some();
+        match format {
+            FormatName::Nav2 => self.of.is_none() && !of_model,
+            FormatName::Model(_) => {
+                !self.is_of_nav2() && self.of.is_none() && self.height_m.is_none()
+            }
+            FormatName::Geojson => {
+                let is_map = self.of.unwrap_or_default() == Shown::Map;
+                !(self.is_of_nav2() || is_map && of_model)
+            }
+        }
     }
 
     fn content(&self) -> Content {
@@ -88,21 +114,31 @@ impl ExportQuery {
     }
 }
 
-/// The whole map as a file: `geojson`, or `nav2` (a zip of `map.yaml` and `map.pgm` or `map.png`).
+/// A format that can be asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum FormatName {
+    Geojson,
+    Nav2,
+    Model(Format),
+}
+
+/// The whole map as a file: `geojson`, or `nav2` (a zip of `map.yaml` and `map.pgm` or `map.png`). Or the a-priori
+/// model: `jsonfg` (all of it, with the prototypes that it uses; `imports` takes it back without loss).
 ///
 /// Equal maps give equal bytes. GeoJSON has a `LineString` for each solid part of a segment (with
 /// the feature id `<segment id>#<n>`), a `Polygon` for each cluster and the one or the other for each
-/// chain, in metres of the level. A nav2 map can be had in every mode of `map_server`, of each layer,
+/// chain, in metres of the level; of the model, the outlines (`Polygon`), sheets and openings (`LineString`) that a sensor
+/// at a height would see, and the landmarks there (`Point`). A nav2 map can be had in every mode of `map_server`, of each layer,
 /// and of a rectangle; its yaw is 0, and its numbers are written in full.
 #[utoipa::path(
     get, path = route::EXPORTS, operation_id = "export", tag = "map",
     params(
         ("site" = String, Path), ("level" = String, Path),
-        ("format" = String, Path, description = "`geojson` or `nav2`"),
+        ("format" = String, Path, description = "`geojson`, `nav2` or `jsonfg`"),
         ExportQuery,
     ),
     responses(
-        (status = 200, description = "The file", content((Object = "application/geo+json"), (Vec<u8> = "application/zip"))),
+        (status = 200, description = "The file", content((Object = "application/geo+json"), (GdbDocument = "application/fg+json"), (Vec<u8> = "application/zip"))),
         (status = 404, description = "`format_not_found`"),
         (status = 409, description = "`map_empty`, `map_too_large`: there is no image of this map, or not of all of it"),
     )
@@ -114,29 +150,61 @@ pub(super) async fn read(
     QueryOf(query): QueryOf<ExportQuery>,
     reader: Reader,
 ) -> Result<Response, ApiError> {
-    let (media_type, extension, nav2) = match format.as_str() {
-        "geojson" if query.is_empty() => (geojson::MEDIA_TYPE, "geojson", None),
-        "geojson" => {
-            let words = "geojson is of the whole vector map: it takes none of these.";
-            return Err(ApiError::Query(words.to_owned()));
-        }
-        "nav2" => (ZIP, "zip", Some((query.content(), query.style()?))),
+    let asked = match format.as_str() {
+        "geojson" => FormatName::Geojson,
+        "nav2" => FormatName::Nav2,
+        "jsonfg" => FormatName::Model(Format::Jsonfg),
         _ => return Err(ApiError::not_found("format", format)),
     };
-    let media_type = reader.choose(&[media_type])?;
-    let _turn = app.exports.acquire().await.ok().ok_or(ApiError::Closing)?;
-    let snapshot = level.level.snapshot();
-    let (frame, revision) = (level.level.frame(), snapshot.folded_revision());
-    let write = move || match nav2 {
-        None => write_geojson(&snapshot),
-        Some((content, style)) => write_nav2(&snapshot, content, style),
+    if !query.fits(asked) {
+        return Err(ApiError::Query(format!("{format} does not take all of these.")));
+    }
+    let (mut response, extension) = match asked {
+        FormatName::Model(format) => {
+            let state = query.state.unwrap_or_default();
+            let response = model_exports::whole(&app, &level, format, state, &reader).await?;
+            (response, format.extension())
+        }
+        FormatName::Geojson if query.of.unwrap_or_default() != Shown::Map => {
+            reader.choose(&[geojson::MEDIA_TYPE])?;
+            let _turn = app.exports.acquire().await.ok().ok_or(ApiError::Closing)?;
+            let height_m = height(query.height_m)?;
+            let snapshot = (query.of == Some(Shown::All)).then(|| level.level.snapshot());
+            let state = query.state.unwrap_or_default();
+            let response =
+                model_exports::features(&level, state, height_m, snapshot, &reader).await?;
+            (response, "geojson")
+        }
+        FormatName::Geojson => {
+            let media_type = reader.choose(&[geojson::MEDIA_TYPE])?;
+            (of_map(&app, &level, media_type, &reader, write_geojson).await?, "geojson")
+        }
+        FormatName::Nav2 => {
+            let (content, style) = (query.content(), query.style()?);
+            let media_type = reader.choose(&[ZIP])?;
+            let write = move |snapshot: &Snapshot| write_nav2(snapshot, content, style);
+            (of_map(&app, &level, media_type, &reader, write).await?, "zip")
+        }
     };
-    let mut response = reader.file(frame, revision, media_type, write).await?;
     let name = format!("attachment; filename=\"{site}-{name}.{extension}\"");
     if let Ok(name) = HeaderValue::from_str(&name) {
         response.headers_mut().insert(CONTENT_DISPOSITION, name);
     }
     Ok(response)
+}
+
+/// A file of what robots saw.
+async fn of_map(
+    app: &App,
+    level: &LevelFor<Read>,
+    media_type: &'static str,
+    reader: &Reader,
+    write: impl FnOnce(&Snapshot) -> Result<Vec<u8>, ApiError> + Send + 'static,
+) -> Result<Response, ApiError> {
+    let _turn = app.exports.acquire().await.ok().ok_or(ApiError::Closing)?;
+    let snapshot = level.level.snapshot();
+    let (frame, revision) = (level.level.frame(), snapshot.folded_revision());
+    reader.file_of(frame, &[revision], revision, media_type, move || write(&snapshot)).await
 }
 
 fn write_geojson(snapshot: &Snapshot) -> Result<Vec<u8>, ApiError> {

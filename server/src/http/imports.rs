@@ -5,7 +5,7 @@ use axum::extract::{Request, State};
 use axum::http::HeaderMap;
 use axum::response::Response;
 use mapfold_schema::route;
-use mapfold_schema::v1::{Import, ImportPage, ImportReport};
+use mapfold_schema::v1::{Import, ImportPage, ImportReport, ModelFormat};
 use serde::Deserialize;
 
 use super::access::{Edit, LevelFor, Read};
@@ -13,11 +13,14 @@ use super::answer::{Reader, blocking, created};
 use super::body::{self, media_type};
 use super::buildings::{self, Taking, is_building};
 use super::exports::ZIP;
+use super::model_imports;
 use super::problem::ApiError;
 use super::query::{QueryOf, before, page_limit};
 use super::state::App;
 use crate::auth;
+use crate::exchange::jsonfg;
 use crate::exchange::nav2::{Package, Trust};
+use crate::level::gdb::WireLibrary;
 use crate::store::imports::NewImport;
 
 /// Imports of a page, if the request names no number; and at most.
@@ -37,7 +40,7 @@ pub(super) struct ImportQuery {
     trust: Option<f64>,
     /// Of a building: which of its levels; the only one if absent.
     building_level: Option<String>,
-    /// Of a building, `true`: what is in the draft of the GDB and not in the building goes.
+    /// Of a building or a model, `true`: what is in the draft of the GDB and not in the file goes.
     #[serde(default)]
     replace: bool,
 }
@@ -68,6 +71,10 @@ pub(super) struct PageQuery {
 /// A `building.yaml` of Open-RMF's traffic editor, as `application/yaml`, goes into the draft of the GDB instead: walls,
 /// doorways and floors of one of its levels, and models that the site has prototypes of; the answer is a
 /// `BuildingImport`. The same file gives the same objects. `If-Match` may name the draft that it is taken on.
+///
+/// A model as JSON-FG (`application/fg+json`: a `GdbDocument`, as `exports/jsonfg` gives it) goes there too, and its prototypes
+/// into the library of the site, of which no prototype is changed: one whose name is taken gets a name of its own. The
+/// answer is a `ModelImport`, which tells what was left out, and why.
 #[utoipa::path(
     post, path = route::IMPORTS, operation_id = "import", tag = "map",
     params(("site" = String, Path), ("level" = String, Path), ImportQuery),
@@ -76,7 +83,7 @@ pub(super) struct PageQuery {
         (status = 200, body = ImportReport, description = "What was found, for a preview"),
         (status = 201, body = Import, description = "It is the prior"),
         (status = 413, description = "`payload_too_large`, `image_too_large`"),
-        (status = 422, description = "`invalid_map_package`, `invalid_map_metadata`, `invalid_map_data`, `invalid_building`: what is wrong, where, and what to do"),
+        (status = 422, description = "`invalid_map_package`, `invalid_map_metadata`, `invalid_map_data`, `invalid_building`, `invalid_model_file`: what is wrong, where, and what to do"),
     )
 )]
 pub(super) async fn create(
@@ -96,8 +103,20 @@ pub(super) async fn create(
         let taking = Taking { preview, building_level, replace };
         return buildings::take(&app, &level, taking, &reader, &headers, bytes).await;
     }
-    if building_level.is_some() || replace {
-        let words = "`building_level` and `replace` are of buildings (`application/yaml`).";
+    if building_level.is_some() {
+        let words = "`building_level` is of buildings (`application/yaml`).";
+        return Err(ApiError::Query(words.to_owned()));
+    }
+    if let Some(format) = model_imports::format_of(&sent) {
+        let bytes = body::read(request, app.parts.limits.upload_bytes).await?;
+        let taking = model_imports::Taking { preview, replace };
+        let read = move |frame, library: &WireLibrary| match format {
+            ModelFormat::Jsonfg => jsonfg::read(&bytes, frame, library),
+        };
+        return model_imports::take(&app, &level, taking, &reader, &headers, read).await;
+    }
+    if replace {
+        let words = "`replace` is of buildings and models.";
         return Err(ApiError::Query(words.to_owned()));
     }
     if !sent.split(';').next().is_some_and(|essence| essence.trim().eq_ignore_ascii_case(ZIP)) {

@@ -46,7 +46,7 @@ const TAGS_WITH_VALIDATORS: [&str; 6] =
         session::sign_in, session::describe, session::sign_out,
         health::live, health::ready, health::metrics,
     ),
-    components(schemas(Problem, v1::UploadAnswer, v1::BuildingImport)),
+    components(schemas(Problem, v1::UploadAnswer, v1::BuildingImport, v1::ModelImport, v1::GdbDocument)),
     modifiers(&Common),
     security(("token" = []), ("session" = [])),
     tags(

@@ -13,6 +13,7 @@ use mapfold_schema::problem::Problem;
 use mapfold_schema::v1::Scope;
 
 use crate::exchange::building::BuildingError;
+use crate::exchange::incoming::FileFault;
 use crate::exchange::nav2::{ImportError, Nav2Error};
 use crate::level::{LevelError, RevertError, SinceError, SubmitError};
 use crate::store::StoreError;
@@ -53,6 +54,8 @@ pub(super) enum ApiError {
     NotZip,
     /// A building of another program cannot be taken.
     Building(BuildingError),
+    /// A model of another program cannot be taken.
+    ModelFile(FileFault),
     /// A map of another program cannot be taken.
     Import(ImportError),
     /// The body is not of a known type, or cannot be read.
@@ -194,12 +197,15 @@ impl ApiError {
             Self::Level(LevelError::Closing) => Self::Closing.problem(),
             Self::Level(LevelError::Store(error)) | Self::Store(error) => of_store(error),
             Self::NotZip => {
-                let detail = "Send a zip of a YAML and its image, as `application/zip`; or a building.yaml, as \
-                    `application/yaml`.";
+                let detail = "Send a zip of a YAML and its image, as `application/zip`; a building.yaml, as \
+                    `application/yaml`; or a model, as `application/fg+json`.";
                 of(415, "unsupported_media_type", detail)
             }
             Self::Import(error) => untaken(error),
             Self::Building(error) => of(422, "invalid_building", sentence(&error.to_string())),
+            Self::ModelFile(fault) => {
+                invalid("invalid_model_file", &sentence(&fault.to_string()), &fault.errors)
+            }
             Self::Nav2(error) => {
                 let code = match error {
                     Nav2Error::Empty | Nav2Error::EmptyBox => "map_empty",

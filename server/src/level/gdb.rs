@@ -136,6 +136,18 @@ impl GdbModel {
         Self::new(self.version, objects, Arc::clone(&self.library))
     }
 
+    /// The model after an edit that is not in the log yet, with a library that is not either.
+    ///
+    /// # Errors
+    /// [`GdbError::TooLarge`].
+    pub fn with_library(
+        &self,
+        objects: WireObjects,
+        library: WireLibrary,
+    ) -> Result<Self, GdbError> {
+        Self::new(self.version, objects, Arc::new(library))
+    }
+
     /// Which model it is.
     pub fn version(&self) -> GdbVersion {
         self.version

@@ -176,7 +176,7 @@ async fn what_cannot_be_taken_is_told_and_changes_nothing() {
     let refused = post(&floor, &admin, "?trust=2", map_at(0.0)).await;
     assert_eq!(refused.code(400), "query_invalid");
     let path = floor.path(route::IMPORTS);
-    let json = admin.post_bytes(&path, "application/json", map_at(0.0)).await;
+    let json = admin.post_bytes(&path, "application/pdf", map_at(0.0)).await;
     assert_eq!(json.code(415), "unsupported_media_type");
     let robot = server.with(&floor.token("r1").await);
     assert_eq!(post(&floor, &robot, "", map_at(0.0)).await.code(403), "insufficient_scope");

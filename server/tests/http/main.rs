@@ -24,6 +24,7 @@ mod gdb;
 mod imports;
 mod layers;
 mod life;
+mod models;
 mod page;
 mod reverts;
 mod sessions;
