@@ -4,8 +4,8 @@ use std::sync::Once;
 use std::time::Duration;
 
 use mapfold_schema::codec::{self, CBOR, JSON};
-use reqwest::header::{ACCEPT, CONTENT_TYPE};
-use reqwest::{Client, Method};
+use reqwest::header::{ACCEPT, CONTENT_TYPE, IF_MATCH};
+use reqwest::{Client, Method, RequestBuilder};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -131,6 +131,26 @@ impl Api {
         self.post(path, JSON, body).await
     }
 
+    /// `PUT` of a value as JSON, in the place of the version that `if_match` names.
+    ///
+    /// # Errors
+    /// No answer, or a value that JSON cannot hold.
+    pub async fn put_json<T: Serialize>(
+        &self,
+        path: &str,
+        if_match: &str,
+        value: &T,
+    ) -> Result<Answer, Error> {
+        let body = codec::to_json(value).map_err(|e| Error::Answer {
+            url: path.to_owned(),
+            status: 0,
+            body: e.to_string(),
+        })?;
+        let url = format!("{}{path}", self.url);
+        let request = self.http.put(&url).header(ACCEPT, JSON).header(CONTENT_TYPE, JSON);
+        self.answer(url, request.header(IF_MATCH, if_match).body(body)).await
+    }
+
     /// `DELETE`.
     ///
     /// # Errors
@@ -147,13 +167,17 @@ impl Api {
         body: Option<(&str, Vec<u8>)>,
     ) -> Result<Answer, Error> {
         let url = format!("{}{path}", self.url);
-        let fault = |source| Error::Request { url: url.clone(), source };
         let mut request = self.http.request(method, &url).header(ACCEPT, accept);
-        if !self.token.is_empty() {
-            request = request.bearer_auth(&self.token);
-        }
         if let Some((kind, body)) = body {
             request = request.header(CONTENT_TYPE, kind).body(body);
+        }
+        self.answer(url, request).await
+    }
+
+    async fn answer(&self, url: String, mut request: RequestBuilder) -> Result<Answer, Error> {
+        let fault = |source| Error::Request { url: url.clone(), source };
+        if !self.token.is_empty() {
+            request = request.bearer_auth(&self.token);
         }
         let response = request.send().await.map_err(fault)?;
         let header = |name: &str| {

@@ -7,9 +7,12 @@ import type { Evidence, PictureAddress } from "./pyramid";
 import type {
   ContributionPage,
   GdbAnswer,
+  GdbCollection,
+  GdbEdit,
   GdbEntryPage,
   GdbFindings,
   GdbPlan,
+  GdbPreview,
   Import,
   ImportPage,
   ImportReport,
@@ -17,6 +20,7 @@ import type {
   LevelDescription,
   NewRevert,
   Problem,
+  PrototypeCollection,
   RasterChanges,
   Revert,
   RevertPage,
@@ -86,6 +90,14 @@ export interface Api {
   removePrior: (place: Place) => Promise<Import>;
   /** The newest edits and publications of the a-priori model. */
   modelEntries: (place: Place, limit: number, signal: AbortSignal) => Promise<GdbEntryPage>;
+  /** The draft: its objects as they are stored. */
+  draftModel: (place: Place, signal: AbortSignal) => Promise<GdbCollection>;
+  /** The library of the site. */
+  prototypes: (place: Place, signal: AbortSignal) => Promise<PrototypeCollection>;
+  /** Edits the draft that the operator has seen: that very one, or it is refused. */
+  editModel: (place: Place, edit: GdbEdit, made: { draft: number; library: number; comment: string }) => Promise<GdbAnswer>;
+  /** What an edit would come to. */
+  previewEdit: (place: Place, edit: GdbEdit, signal: AbortSignal) => Promise<GdbPreview>;
   /** What is wrong with the draft. */
   findings: (place: Place, signal: AbortSignal) => Promise<GdbFindings>;
   /** Hands a draft with a library to the robots: that very one, or it is refused. */
@@ -127,6 +139,10 @@ export function isAborted(error: unknown): boolean {
 
 function posted(body: object): RequestInit {
   return { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) };
+}
+
+function patched(body: object, ifMatch: string): RequestInit {
+  return { method: "PATCH", headers: { "content-type": "application/json", "if-match": ifMatch }, body: JSON.stringify(body) };
 }
 
 function zip(body: Blob): RequestInit {
@@ -208,6 +224,11 @@ export function createApi(browser: Browser): Api {
     importPrior: (place, map, trust) => askJson(`${levelPath(place)}/imports?trust=${trust}`, zip(map)),
     removePrior: (place) => askJson(`${levelPath(place)}/imports`, { method: "DELETE" }),
     modelEntries: (place, limit, signal) => askJson(`${levelPath(place)}/gdb/entries?limit=${limit}`, { signal }),
+    draftModel: (place, signal) => askJson(`${levelPath(place)}/gdb?state=draft&place=false`, { signal }),
+    prototypes: (place, signal) => askJson(`/api/v1/sites/${encodeURIComponent(place.site)}/prototypes`, { signal }),
+    editModel: (place, edit, { draft, library, comment }) =>
+      askJson(`${levelPath(place)}/gdb?comment=${encodeURIComponent(comment)}`, patched(edit, `"${draft}.${library}"`)),
+    previewEdit: (place, edit, signal) => askJson(`${levelPath(place)}/gdb?preview=true`, { ...patched(edit, "*"), signal }),
     findings: (place, signal) => askJson(`${levelPath(place)}/gdb/findings`, { signal }),
     publishModel: (place, { draft, library }) =>
       askJson(`${levelPath(place)}/gdb/publications`, { method: "POST", headers: { "if-match": `"${draft}.${library}"` } }),

@@ -15,6 +15,7 @@
 
 import { tileCount } from "./content";
 import type { Painted } from "./map/view";
+import { unsentCount } from "./editing";
 import { memo } from "./memo";
 import { cornersOf } from "./model";
 import { robotsHere, type State } from "./state";
@@ -30,18 +31,23 @@ export interface Facts {
 export function createFacts(root: HTMLElement): Facts {
   const tiles = memo(tileCount);
   const plan = memo((shown: GdbPlan | null) => (shown === null ? "" : `${shown.height_m} ${cornersOf(shown).length}`));
+  const unsents = memo(unsentCount);
   const say = (name: string, value: string | number): void => {
     const text = String(value);
     if (root.dataset[name] !== text) root.dataset[name] = text;
   };
   return {
-    drawn({ session, place, link, model }) {
+    drawn({ session, place, link, model, editing }) {
       say("session", session.kind);
       say("site", place?.site ?? "");
       say("level", place?.level ?? "");
       say("live", link.kind);
       say("model", plan(model.plan));
       say("landmarks", model.landmarks.size);
+      // What is drawn of the draft, and what of it is not sent; empty while nobody edits.
+      say("objects", editing.copy?.now.size ?? "");
+      say("unsent", editing.copy === null ? "" : unsents(editing));
+      say("clashes", editing.clashes.length);
     },
     painted(state, { piecesPainted, picturesLoaded, picturesPending }) {
       const { content } = state;

@@ -4,6 +4,9 @@
 import { createApi } from "./api";
 import { setShown } from "./dom";
 import { createDraftActions } from "./drafting";
+import { createEditActions } from "./editing/acting";
+import { commanded } from "./editing/commands";
+import { commandOf } from "./editing/keys";
 import { createFacts } from "./facts";
 import { followLevel } from "./feed";
 import { createImportActions } from "./importing";
@@ -11,6 +14,8 @@ import { createMapView } from "./map/view";
 import { followModel, type ModelFollower } from "./modelling";
 import { DARK, LIGHT, type Theme } from "./palette";
 import { createContributionsCard } from "./panels/contributions_card";
+import { createEditBar } from "./panels/edit_bar";
+import { createEditCard } from "./panels/edit_card";
 import { createHeader } from "./panels/header";
 import { createLayersCard } from "./panels/layers_card";
 import { createLevelCard } from "./panels/level_card";
@@ -45,6 +50,7 @@ const timers = {
     window.clearTimeout(timer);
   },
 };
+const uuid = (): string => uuidFrom(crypto.getRandomValues(new Uint8Array(16)));
 const api = createApi({ fetch: window.fetch.bind(window), nowMs: () => Date.now() });
 
 // A token in the address must not stay there: it would end up in bookmarks and in other people's hands.
@@ -68,6 +74,7 @@ const map = createMapView({
   api,
   theme,
   timers,
+  uuid,
   onPainted: facts.painted,
 });
 
@@ -75,9 +82,10 @@ const map = createMapView({
 const page = byId("page");
 const panels = byId("panels");
 const overMap = byId("over-map");
-const log = createLogActions({ api, state: store.state, dispatch, uuid: () => uuidFrom(crypto.getRandomValues(new Uint8Array(16))) });
+const log = createLogActions({ api, state: store.state, dispatch, uuid });
 const prior = createImportActions({ api, state: store.state, dispatch });
 const draft = createDraftActions({ api, state: store.state, dispatch });
+const edit = createEditActions({ api, state: store.state, dispatch, memory: window.localStorage, timers });
 const draws = [
   createHeader({ parent: byId("header"), store, onSignOut: () => void signOut(api, dispatch) }),
   createLevelCard(panels),
@@ -88,7 +96,9 @@ const draws = [
   createContributionsCard(panels, { store, theme, onOpenLog: log.open }),
   createLogPanel({ parent: page, store, theme, actions: log }),
   createSelectionCard(overMap, store),
-  createMapTools({ parent: overMap, store, onZoom: map.zoomBy }),
+  createEditCard(panels, { store, actions: edit }),
+  createEditBar({ parent: overMap, store, actions: edit, hand: { uuid } }),
+  createMapTools({ parent: overMap, store, onZoom: map.zoomBy, edit }),
   createMessages(overMap, window.location.origin),
   createSignIn({
     parent: byId("screen"),
@@ -102,6 +112,8 @@ store.onFrame((state) => {
   setShown(page, state.session.kind === "in");
   page.classList.toggle("panels-open", state.panelsOpen);
   page.classList.toggle("log-open", state.log.open);
+  page.classList.toggle("edit-on", state.editing.on);
+  stage.classList.toggle("drawing", state.editing.on && state.editing.tool !== "select");
   for (const draw of draws) draw(state);
 });
 darkScheme.addEventListener("change", () => {
@@ -129,6 +141,7 @@ store.onChange((state, before) => {
           });
     model?.stop();
     model = follows === null ? null : followModel({ place: follows, api, state: store.state, dispatch, timers });
+    if (follows !== null) edit.arrived();
   }
 });
 store.onChange((state, before) => {
@@ -136,7 +149,12 @@ store.onChange((state, before) => {
   const isAnotherModel = before.model.view !== state.model.view || before.level?.revision !== state.level?.revision;
   if (isAnotherModel || before.layers !== state.layers) model?.look();
   // What follows the model has just found that it is another.
-  if (before.model.revision !== state.model.revision) draft.refresh();
+  if (before.model.revision !== state.model.revision) {
+    draft.refresh();
+    edit.refresh();
+  }
+  const { copy, clashes } = state.editing;
+  if (copy !== null && (copy !== before.editing.copy || clashes !== before.editing.clashes)) edit.changed();
   if (state.imports.open && before.level !== state.level) prior.refresh();
 });
 store.onChange((state) => {
@@ -150,6 +168,28 @@ window.addEventListener("hashchange", () => {
   dispatch({ kind: "permalink", link: parsePermalink(hash.rest) });
 });
 
+// Keys of the editor, before those of the map.
+document.addEventListener(
+  "keydown",
+  (event) => {
+    const { editing } = store.state();
+    const field = event.target instanceof Element ? event.target.closest("input, select, textarea") : null;
+    const { key, shiftKey: shift, altKey: alt } = event;
+    const command = commandOf({ key, shift, alt, ctrl: event.ctrlKey || event.metaKey }, editing);
+    // Who types means the text; only sending is meant from everywhere.
+    if (command === null || (field !== null && command !== "send")) return;
+    if (command === "type-length") {
+      document.getElementById("edit-length")?.focus();
+      return;
+    }
+    event.preventDefault();
+    event.stopPropagation();
+    if (command === "send") edit.send();
+    else edit.change(commanded(editing, command, { uuid }, shift));
+  },
+  { capture: true },
+);
+
 // Keys, while nobody types.
 document.addEventListener("keydown", (event) => {
   const typing = event.target instanceof Element && event.target.closest("input, select, textarea") !== null;
@@ -161,6 +201,9 @@ document.addEventListener("keydown", (event) => {
       break;
     case "g":
       dispatch({ kind: "layer", name: "grid", setting: { on: !state.layers.grid.on } });
+      break;
+    case "e":
+      edit.start();
       break;
     case "+":
     case "-":

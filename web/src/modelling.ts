@@ -61,8 +61,8 @@ export function followModel({ place, api, state, dispatch, timers }: ModelFollow
 
   return {
     look: () => {
-      const { layers, draft } = state();
-      if (layers.model.on || layers.landmarks.on || draft.open) looking.request();
+      const { layers, draft, editing } = state();
+      if (layers.model.on || layers.landmarks.on || draft.open || editing.on) looking.request();
     },
     stop: () => {
       abort.abort();

@@ -28,6 +28,8 @@ export function noticeOf(state: State, origin: string): Notice | null {
   if (state.level === null) {
     return state.link.kind === "lost" ? null : { title: "Loading", text: "Asking the server for the map." };
   }
+  // Who draws the building needs the ground, empty as it is.
+  if (state.editing.on) return null;
   const { segments, clusters, tiles, vectorRevision } = state.content;
   if (state.level.revision === 0 && segments.size + clusters.size + tiles.size + vectorRevision === 0) {
     return {

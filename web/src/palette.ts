@@ -26,6 +26,10 @@ export interface Theme {
   chain: string;
   /** The plan of the a-priori model. */
   model: string;
+  /** What is drawn of the model and not in the draft yet. */
+  drawn: string;
+  /** What no longer fits, and what a point has snapped to. */
+  clash: string;
   /** Landmarks. */
   landmark: string;
   /** What a robot that is not heard is drawn in. */
@@ -47,6 +51,8 @@ export const LIGHT: Theme = {
   several: "#1f2933",
   chain: "#0f8f7a",
   model: "#5b3a29",
+  drawn: "#0b6aa8",
+  clash: "#b34700",
   landmark: "#b3005e",
   silent: "#7b8794",
   grid: "rgba(31, 41, 51, 0.10)",
@@ -64,6 +70,8 @@ export const DARK: Theme = {
   several: "#f1f5f9",
   chain: "#3fd0b6",
   model: "#e3c9a8",
+  drawn: "#6cb8ee",
+  clash: "#ffb454",
   landmark: "#ff8ad0",
   silent: "#8b98a5",
   grid: "rgba(241, 245, 249, 0.10)",

@@ -7,6 +7,7 @@ import { withSlots } from "./palette";
 import type { Permalink, Place, View } from "./permalink";
 import type { Evidence } from "./pyramid";
 import { NO_DRAFT, type DraftState } from "./drafts";
+import { NO_EDITING, type EditingState } from "./editing";
 import { NO_IMPORTS, type ImportsState } from "./imports";
 import { NO_MODEL, type ModelState, type ModelView } from "./model";
 import { NO_LOG, type LogState } from "./reverts";
@@ -64,6 +65,7 @@ export interface State {
   imports: ImportsState;
   model: ModelState;
   draft: DraftState;
+  editing: EditingState;
   link: Link;
   layers: Layers;
   evidence: Evidence;
@@ -91,6 +93,7 @@ export type Event =
   | { kind: "log"; log: Partial<LogState> }
   | { kind: "imports"; imports: Partial<ImportsState> }
   | { kind: "draft"; draft: Partial<DraftState> }
+  | { kind: "editing"; editing: Partial<EditingState> }
   | { kind: "model"; model: Partial<ModelState> }
   | { kind: "model-view"; view: Partial<ModelView> }
   | { kind: "heard"; robots: readonly string[]; atMs: number }
@@ -117,6 +120,7 @@ const NO_LEVEL = {
   log: NO_LOG,
   imports: NO_IMPORTS,
   draft: NO_DRAFT,
+  editing: NO_EDITING,
   link: { kind: "idle" },
   selection: null,
   pointer: null,
@@ -182,6 +186,8 @@ export function update(state: State, event: Event): State {
       return { ...state, imports: { ...state.imports, ...event.imports } };
     case "draft":
       return { ...state, draft: { ...state.draft, ...event.draft } };
+    case "editing":
+      return { ...state, editing: { ...state.editing, ...event.editing } };
     case "model":
       return forgetSelectionThatIsGone({ ...state, model: { ...state.model, ...event.model } });
     case "model-view":

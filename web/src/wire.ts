@@ -57,6 +57,25 @@ export type GdbPlan = Exactly<
   Wire["GdbPlan"],
   { outlines: PlanCorner[][]; sheets: PlanCorner[][]; openings: PlanOpening[] }
 >;
+export type ObjectKind = Wire["ObjectKind"];
+export type DoorKind = Wire["DoorKind"];
+export type Triple = [number, number, number];
+export type GdbPlacement = Exactly<Wire["GdbPlacement"], { position_m: Triple; rotation?: [number, number, number, number] | null }>;
+export type GdbBox = Exactly<Wire["GdbBox"], { from_m: Triple; to_m: Triple }>;
+export type GdbPrism = Exactly<Wire["GdbPrism"], { base_m: [number, number][][] }>;
+export type GdbCylinder = Exactly<Wire["GdbCylinder"], { centre_m: [number, number] }>;
+export type GdbPolyhedron = Exactly<Wire["GdbPolyhedron"], { vertices_m: Triple[] }>;
+export type GdbSolid = { box: GdbBox } | { prism: GdbPrism } | { cylinder: GdbCylinder } | { polyhedron: GdbPolyhedron };
+export type GdbObject = Exactly<Wire["GdbObject"], { solids?: GdbSolid[] | null; placement?: GdbPlacement | null }>;
+export type GdbPrototype = Exactly<Wire["GdbPrototype"], { solids: GdbSolid[] }>;
+export type GdbCollection = Omit<Wire["GdbCollection"], "features"> & { features: { id: string; properties: GdbObject }[] };
+export type PrototypeCollection = Omit<Wire["PrototypeCollection"], "features"> & { features: { id: string; properties: GdbPrototype }[] };
+/** `PATCH L/gdb`: objects put as they are to be, and others removed. */
+export interface GdbEdit {
+  put: { type: "Feature"; id: string; properties: GdbObject }[];
+  remove: string[];
+}
+export type GdbPreview = Exactly<Wire["GdbPreview"], { findings: GdbFinding[] }>;
 export type GdbEntry = Wire["GdbEntry"];
 export type GdbEntryPage = Wire["GdbEntryPage"];
 export type GdbFinding = Exactly<Wire["GdbFinding"], { at_m?: [number, number, number] | null }>;

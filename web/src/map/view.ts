@@ -9,6 +9,7 @@ import Projection from "ol/proj/Projection.js";
 import type { Api } from "../api";
 import type { Timers } from "../coalesce";
 import { boundsOf } from "../content";
+import { unsent } from "../editing/history";
 import { holds, shareOf, union, widened, type Box, type Point } from "../geometry";
 import { LAYER_NAMES, type LayerName } from "../layers";
 import { memo } from "../memo";
@@ -20,8 +21,10 @@ import { isSilent, robotsHere, samePlace, tileEdgeM, type State } from "../state
 import type { Store } from "../store";
 import { batchesOf } from "./batches";
 import type { Frame } from "./frame";
+import { createGestures } from "./gestures";
 import { paintChains } from "./paint_chains";
 import { paintClusters } from "./paint_clusters";
+import { paintEditing } from "./paint_editing";
 import { paintGrid } from "./paint_grid";
 import { paintLandmarks } from "./paint_landmarks";
 import { paintModel } from "./paint_model";
@@ -68,6 +71,7 @@ export interface MapViewOptions {
   api: Api;
   theme: () => Theme;
   timers: Timers;
+  uuid: () => string;
   /** The map was painted, from this state. */
   onPainted: (state: State, painted: Painted) => void;
 }
@@ -101,6 +105,10 @@ export function createMapView(options: MapViewOptions): MapView {
   );
   const bounds = memo(boundsOf);
   const planBounds = memo(boundsOfPlan);
+  const marked = memo((copy: State["editing"]["copy"], clashes: State["editing"]["clashes"]) => ({
+    unsent: copy === null ? new globalThis.Map<string, unknown>() : unsent(copy),
+    clashing: new Set(clashes.map(({ id }) => id)),
+  }));
 
   const painters: Record<LayerName, (frame: Frame) => void> = {
     raster: (frame) => {
@@ -113,7 +121,8 @@ export function createMapView(options: MapViewOptions): MapView {
       paintGrid(frame, theme());
     },
     model: (frame) => {
-      if (state.model.plan !== null) paintModel(frame, state.model.plan, theme());
+      // The draft that is being edited is painted in its place.
+      if (state.model.plan !== null && !state.editing.on) paintModel(frame, state.model.plan, theme());
     },
     landmarks: (frame) => {
       paintLandmarks(frame, state.model.landmarks.values(), theme());
@@ -143,6 +152,10 @@ export function createMapView(options: MapViewOptions): MapView {
     paintSelection(frame, state, theme());
     paintPreview(frame, state, theme());
   });
+  const editingLayer = createPainterLayer("editing", (frame) => {
+    const { editing } = state;
+    if (editing.on) paintEditing(frame, editing, marked(editing.copy, editing.clashes), theme());
+  });
 
   const projection = new Projection({ code: "mapfold:level", units: "m", metersPerUnit: 1, axisOrientation: "enu" });
   const view = new View({
@@ -167,10 +180,21 @@ export function createMapView(options: MapViewOptions): MapView {
       layers.chains,
       selectionLayer,
       layers.segments,
+      editingLayer,
       layers.landmarks,
       layers.robots,
     ],
   });
+
+  const gestures = createGestures({
+    editing: () => store.state().editing,
+    change: (editing) => {
+      store.dispatch({ kind: "editing", editing });
+    },
+    resolution: () => resolution(),
+    hand: { uuid: options.uuid },
+  });
+  for (const interaction of gestures.interactions) map.addInteraction(interaction);
 
   /** What the page itself has last set; anything else is the operator's doing. */
   let applied: { centre: Point; resolution: number } | null = null;
@@ -266,17 +290,19 @@ export function createMapView(options: MapViewOptions): MapView {
   map.on("moveend", () => {
     if (!isApplied()) tellMoved();
   });
-  map.on("pointermove", ({ coordinate, dragging }) => {
+  map.on("pointermove", (event) => {
+    const { coordinate, dragging } = event;
     const [x = 0, y = 0] = coordinate;
     store.dispatch({ kind: "pointer", at: [x, y] });
-    if (!dragging) target.classList.toggle("over-something", pick(state, [x, y], resolution()) !== null);
+    if (!gestures.move(event) && !dragging) target.classList.toggle("over-something", pick(state, [x, y], resolution()) !== null);
   });
   target.addEventListener("pointerleave", () => {
     store.dispatch({ kind: "pointer", at: null });
+    gestures.leave();
   });
-  map.on("click", ({ coordinate }) => {
-    const [x = 0, y = 0] = coordinate;
-    store.dispatch({ kind: "select", selection: pick(state, [x, y], resolution()) });
+  map.on("click", (event) => {
+    const [x = 0, y = 0] = event.coordinate;
+    if (!gestures.click(event)) store.dispatch({ kind: "select", selection: pick(state, [x, y], resolution()) });
   });
   map.on("postrender", () => {
     const { loaded, pending } = pictures.counts();
@@ -315,6 +341,7 @@ function drawnFrom(state: State): readonly unknown[] {
     state.evidence,
     state.level,
     state.model,
+    state.editing,
     state.nowMs,
   ];
 }

@@ -1,5 +1,6 @@
 // What lies on the map itself: zooming, the scale bar, the place under the pointer.
 
+import { mayEdit, type EditActions } from "../editing/acting";
 import { el, setShown, setText } from "../dom";
 import { scaleBar } from "../scale";
 import type { State } from "../state";
@@ -15,9 +16,10 @@ export interface MapToolsOptions {
   parent: HTMLElement;
   store: Store;
   onZoom: (factor: number) => void;
+  edit: Pick<EditActions, "start" | "stop">;
 }
 
-export function createMapTools({ parent, store, onZoom }: MapToolsOptions): (state: State) => void {
+export function createMapTools({ parent, store, onZoom, edit }: MapToolsOptions): (state: State) => void {
   const tool = (text: string, title: string, click: () => void): HTMLButtonElement =>
     el("button", { text, attrs: { type: "button", title, "aria-label": title }, on: { click } });
   const fit = tool("Fit", "Show the whole level and keep it so (F)", () => {
@@ -26,6 +28,11 @@ export function createMapTools({ parent, store, onZoom }: MapToolsOptions): (sta
   const grid = tool("Grid", "Show or hide the grid (G)", () => {
     store.dispatch({ kind: "layer", name: "grid", setting: { on: !store.state().layers.grid.on } });
   });
+  const editing = tool("Edit", "Edit the draft of the model (E)", () => {
+    if (store.state().editing.on) edit.stop();
+    else edit.start();
+  });
+  editing.id = "edit-model";
   const tools = el(
     "div",
     { class: "tools", attrs: { role: "toolbar", "aria-label": "Map" } },
@@ -37,6 +44,7 @@ export function createMapTools({ parent, store, onZoom }: MapToolsOptions): (sta
     }),
     fit,
     grid,
+    editing,
   );
   const bar = el("span", { class: "bar" });
   const barText = el("span");
@@ -50,6 +58,8 @@ export function createMapTools({ parent, store, onZoom }: MapToolsOptions): (sta
     setShown(foot, shown);
     fit.setAttribute("aria-pressed", String(state.view.kind === "fit"));
     grid.setAttribute("aria-pressed", String(state.layers.grid.on));
+    editing.setAttribute("aria-pressed", String(state.editing.on));
+    setShown(editing, mayEdit(state));
     const { lengthM, lengthPx } = scaleBar(state.shownResolution, SCALE_MOST_PX);
     bar.style.width = `${lengthPx.toFixed(1)}px`;
     setText(barText, lengthInWords(lengthM));
