@@ -9,6 +9,8 @@ export default defineConfig({
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
     reportCompressedSize: true,
+    // three.js, which is loaded when the view in space is asked for.
+    chunkSizeWarningLimit: 600,
   },
   server: {
     // `npm run dev` against a running server.

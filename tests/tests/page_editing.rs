@@ -67,6 +67,10 @@ async fn the_page_draws_a_room_that_robots_then_know() -> Result<(), Error> {
 
     assert_eq!(event("reader")["editor"], false, "{said}");
     assert_eq!((&event("drawn")["objects"], &event("drawn")["unsent"]), (&json!(7), &json!(7)));
+    // In space the chosen table is the same one, and what is chosen there is chosen on the map.
+    assert_eq!(event("space")["chosen_before"], 1, "{said}");
+    assert_eq!(event("space")["chosen"], "table", "{said}");
+    assert_eq!(event("space")["x_m"], 3.0, "{said}");
     assert_eq!(event("undone")["objects"], 5, "{said}");
     assert_eq!(event("redone")["objects"], 7, "{said}");
     assert_eq!(event("kept")["unsent"], 7, "{said}");

@@ -7,6 +7,7 @@
 //
 //   {"event": "reader", "editor": false}                      what a token without map:edit is shown
 //   {"event": "drawn", "objects", "unsent"}                   a room with a door, a prototype and a copy of it
+//   {"event": "space", "chosen_before", "chosen", "on_the_map", "x_m"}  the same in space: what is chosen before and after a click there
 //   {"event": "undone", "objects"}  {"event": "redone", "objects"}
 //   {"event": "kept", "objects", "unsent", "text"}            after the page was loaded again
 //   {"event": "sent", "text", "findings"}
@@ -32,6 +33,9 @@ function setting(name) {
   return value;
 }
 
+/** Where the view in space first shows the table that was placed last, as shares of its width and height. */
+const SPACE_TABLE = /** @type {const} */ ([0.6, 0.5]);
+
 const url = setting("PAGE_URL").replace(/\/$/, "");
 const place = `site=${encodeURIComponent(setting("SITE"))}&level=${encodeURIComponent(setting("LEVEL"))}`;
 const shots = process.env["SHOTS"];
@@ -55,7 +59,9 @@ async function opened(token) {
   page.on("console", (message) => {
     // What the server refuses, the browser reports too; the page says it in words.
     const refused = message.text().startsWith("Failed to load resource");
-    if ((message.type() === "error" || message.type() === "warning") && !refused) consoleErrors.push(message.text());
+    // Pictures of what software draws in space take a while: so says the driver.
+    const slow = message.text().includes("GPU stall due to ReadPixels");
+    if ((message.type() === "error" || message.type() === "warning") && !refused && !slow) consoleErrors.push(message.text());
   });
   page.on("pageerror", (error) => consoleErrors.push(error.message));
   await page.goto(`${url}/#token=${encodeURIComponent(token)}&${place}&x=${MIDDLE[0]}&y=${MIDDLE[1]}&resolution=${RESOLUTION}&layers=raster,grid,model,segments,landmarks`);
@@ -112,8 +118,8 @@ async function until(page, name, value) {
 /** @param {Page} page */
 async function facts(page) {
   return page.evaluate(() => {
-    const { objects, unsent, clashes } = document.documentElement.dataset;
-    return { objects: Number(objects), unsent: Number(unsent), clashes: Number(clashes) };
+    const { objects, unsent, clashes, chosen } = document.documentElement.dataset;
+    return { objects: Number(objects), unsent: Number(unsent), clashes: Number(clashes), chosen: Number(chosen) };
   });
 }
 
@@ -148,6 +154,27 @@ try {
   await page.locator("#edit-yaw").waitFor();
   say({ event: "drawn", ...(await facts(page)) });
   await shoot(page, "drawn");
+
+  // In space: the same is chosen, and what is chosen there is chosen on the map.
+  await page.keyboard.press("3");
+  await until(page, "space", 7);
+  await page.locator(".space canvas").waitFor();
+  const before = await facts(page);
+  await shoot(page, "space");
+  const inSpace = await page.locator(".space canvas").boundingBox();
+  if (inSpace === null) throw new Error("there is no view in space");
+  // Between the walls and the front of the view there is nothing: that chooses nothing.
+  await page.mouse.click(inSpace.x + inSpace.width / 2, inSpace.y + inSpace.height - 40);
+  await until(page, "chosen", 0);
+  // The middle of the room is hidden by no wall; the table on the right stands a little beside it.
+  await page.mouse.click(inSpace.x + inSpace.width * SPACE_TABLE[0], inSpace.y + inSpace.height * SPACE_TABLE[1]);
+  await until(page, "chosen", 1);
+  const chosenInSpace = await page.locator(".space-chosen").innerText();
+  await page.keyboard.press("3");
+  await until(page, "space", "");
+  say({ event: "space", chosen_before: before.chosen, chosen: chosenInSpace, on_the_map: await page.locator(".edit-row .hint").innerText(), x_m: Number(await page.locator("#edit-x").inputValue()) });
+  await page.mouse.click(...(await onScreen(page, [3, 1.8])));
+  await until(page, "chosen", 1);
 
   // The turn, the move and the copy are taken back, and made again.
   for (let step = 0; step < 4; step++) await page.keyboard.press("Control+z");

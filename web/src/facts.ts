@@ -26,6 +26,8 @@ export interface Facts {
   drawn: (state: State) => void;
   /** After the map was painted. */
   painted: (state: State, painted: Painted) => void;
+  /** What the view in space shows. */
+  space: (what: string) => void;
 }
 
 export function createFacts(root: HTMLElement): Facts {
@@ -48,6 +50,7 @@ export function createFacts(root: HTMLElement): Facts {
       say("objects", editing.copy?.now.size ?? "");
       say("unsent", editing.copy === null ? "" : unsents(editing));
       say("clashes", editing.clashes.length);
+      say("chosen", editing.chosen.size);
     },
     painted(state, { piecesPainted, picturesLoaded, picturesPending }) {
       const { content } = state;
@@ -61,6 +64,9 @@ export function createFacts(root: HTMLElement): Facts {
       say("tilesPending", picturesPending);
       // Last, for whoever waits for a revision and then reads the rest.
       say("revision", content.vectorRevision);
+    },
+    space: (what) => {
+      say("space", what);
     },
   };
 }

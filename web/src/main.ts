@@ -26,6 +26,7 @@ import { createModelCard } from "./panels/model_card";
 import { createPriorCard } from "./panels/prior_card";
 import { createRobotsCard } from "./panels/robots_card";
 import { createSelectionCard } from "./panels/selection_card";
+import { createSpacePanel } from "./panels/space_panel";
 import { createSignIn } from "./panels/sign_in";
 import { formatPermalink, parsePermalink, takeToken } from "./permalink";
 import { pick } from "./pick";
@@ -96,6 +97,7 @@ const draws = [
   createContributionsCard(panels, { store, theme, onOpenLog: log.open }),
   createLogPanel({ parent: page, store, theme, actions: log }),
   createSelectionCard(overMap, store),
+  createSpacePanel({ parent: overMap, store, actions: edit, theme, onShown: facts.space }),
   createEditCard(panels, { store, actions: edit }),
   createEditBar({ parent: overMap, store, actions: edit, hand: { uuid } }),
   createMapTools({ parent: overMap, store, onZoom: map.zoomBy, edit }),
@@ -204,6 +206,9 @@ document.addEventListener("keydown", (event) => {
       break;
     case "e":
       edit.start();
+      break;
+    case "3":
+      edit.turnSpace();
       break;
     case "+":
     case "-":

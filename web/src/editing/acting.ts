@@ -31,6 +31,8 @@ export interface EditActions {
   start: () => void;
   /** Closes it; what is not sent is kept. */
   stop: () => void;
+  /** Shows the draft in space, or no longer. */
+  turnSpace: () => void;
   /** A level is shown: goes on with edits that were kept. */
   arrived: () => void;
   /** The model's log has gone on. */
@@ -63,7 +65,7 @@ export function createEditActions({ api, state, dispatch, memory, timers }: Edit
   const change = (editing: Partial<EditingState>): void => {
     dispatch({ kind: "editing", editing });
   };
-  const isHere = (place: Place): boolean => samePlace(place, state().place) && state().editing.on;
+  const isHere = (place: Place): boolean => samePlace(place, state().place) && (state().editing.on || state().editing.is3d);
   const failed = (place: Place, error: unknown): void => {
     if (isAborted(error) || hasEnded(error, dispatch) || !isHere(place)) return;
     change({ busy: null, problem: inWords(error) });
@@ -81,8 +83,8 @@ export function createEditActions({ api, state, dispatch, memory, timers }: Edit
     ]);
     if (signal.aborted || !isHere(place)) return;
     const [objects, version] = draftOf(collection);
-    const { copy, clashes, chosen, sketch } = state().editing;
-    const text = copy === null ? memory.getItem(keyOf(place)) : null;
+    const { copy, clashes, chosen, sketch, on } = state().editing;
+    const text = copy === null && on ? memory.getItem(keyOf(place)) : null;
     const next: Rebased =
       copy !== null
         ? rebased(copy, objects, version)
@@ -103,7 +105,7 @@ export function createEditActions({ api, state, dispatch, memory, timers }: Edit
 
   const check = async (): Promise<void> => {
     const { place, editing } = state();
-    if (place === null || editing.copy === null) return;
+    if (place === null || editing.copy === null || !editing.on) return;
     checking.abort();
     checking = new AbortController();
     const { signal } = checking;
@@ -119,7 +121,7 @@ export function createEditActions({ api, state, dispatch, memory, timers }: Edit
 
   const keep = (): void => {
     const { place, editing } = state();
-    if (place === null || editing.copy === null) return;
+    if (place === null || editing.copy === null || !editing.on) return;
     const text = kept(editing.copy, editing.clashes);
     let isKept = true;
     try {
@@ -131,8 +133,9 @@ export function createEditActions({ api, state, dispatch, memory, timers }: Edit
     if (isKept !== editing.isKept) change({ isKept });
   };
 
-  const open = async (place: Place): Promise<void> => {
-    change({ ...NO_EDITING, making: state().editing.making, on: true, busy: "Asking for the draft …" });
+  const open = async (place: Place, on: boolean): Promise<void> => {
+    const { making, is3d } = state().editing;
+    change({ ...NO_EDITING, making, on, is3d: is3d || !on, busy: "Asking for the draft …" });
     try {
       await read(place);
       if (isHere(place)) change({ busy: null });
@@ -185,16 +188,31 @@ export function createEditActions({ api, state, dispatch, memory, timers }: Edit
 
   const start = (): void => {
     const { place, editing } = state();
-    if (place !== null && !editing.on && mayEdit(state())) void open(place);
+    if (place !== null && !editing.on && mayEdit(state())) void open(place, true);
   };
 
   return {
     start,
     stop: () => {
       keep();
-      reading.abort();
       checking.abort();
-      change({ ...NO_EDITING, making: state().editing.making });
+      const { place, editing } = state();
+      if (editing.is3d && place !== null) {
+        void open(place, false);
+        return;
+      }
+      reading.abort();
+      change({ ...NO_EDITING, making: editing.making });
+    },
+    turnSpace: () => {
+      const { place, editing } = state();
+      if (place === null) return;
+      if (!editing.is3d && editing.copy === null && !editing.on) void open(place, false);
+      else if (editing.on || !editing.is3d) change({ is3d: !editing.is3d, sketch: NO_EDITING.sketch });
+      else {
+        reading.abort();
+        change({ ...NO_EDITING, making: editing.making });
+      }
     },
     arrived: () => {
       const { place } = state();
@@ -217,6 +235,8 @@ export function createEditActions({ api, state, dispatch, memory, timers }: Edit
       }
     },
     changed: () => {
+      // Who only looks has nothing to keep.
+      if (!state().editing.on) return;
       keep();
       if (quiet !== null) timers.clearTimeout(quiet);
       checking.abort();

@@ -52,7 +52,8 @@ function snapped(editing: EditingState, pointer: Pointer, options: { walls?: Ite
 /** With another tool at hand; what the old one was in the middle of is finished or dropped. */
 export function withTool(editing: EditingState, tool: Tool, hand: Hand): Partial<EditingState> {
   const prototype = editing.making.prototype ?? [...editing.library.keys()].at(0) ?? null;
-  return { ...finished(editing, hand), tool, making: { ...editing.making, prototype } };
+  // Things are drawn on the map.
+  return { ...finished(editing, hand), tool, is3d: editing.is3d && tool === "select", making: { ...editing.making, prototype } };
 }
 
 /** The pointer has moved with nothing pressed. */
