@@ -5,6 +5,7 @@
 //! which mirrors write too, is in `mapfold_schema::geojson`.
 //!
 //! * [`building`]: a building of Open-RMF's traffic editor, in.
+//! * [`dxf`]: drawings, in and out.
 //! * [`incoming`], [`outgoing`]: models of any format on their way in and out.
 //! * [`jsonfg`]: a model with its prototypes, whole, out and in.
 //! * [`layers`]: which layers a raster has, and where they are found.
@@ -12,9 +13,13 @@
 //! * [`png_tiles`]: the raster as a picture pyramid.
 
 pub mod building;
+pub mod dxf;
 pub mod incoming;
 pub mod jsonfg;
 pub mod layers;
 pub mod nav2;
 pub mod outgoing;
 pub mod png_tiles;
+
+#[cfg(test)]
+mod sample;

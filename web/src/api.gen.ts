@@ -149,7 +149,8 @@ export interface paths {
         };
         /**
          * The whole map as a file: `geojson`, or `nav2` (a zip of `map.yaml` and `map.pgm` or `map.png`). Or the a-priori
-         *     model: `jsonfg` (all of it, with the prototypes that it uses; `imports` takes it back without loss).
+         *     model: `jsonfg` (all of it, with the prototypes that it uses; `imports` takes it back without loss) or `dxf` (solids as
+         *     outlines with a height or as faces, on a layer for each kind, prototypes as blocks).
          * @description Equal maps give equal bytes. GeoJSON has a `LineString` for each solid part of a segment (with
          *     the feature id `<segment id>#<n>`), a `Polygon` for each cluster and the one or the other for each
          *     chain, in metres of the level; of the model, the outlines (`Polygon`), sheets and openings (`LineString`) that a sensor
@@ -327,8 +328,9 @@ export interface paths {
          *     `BuildingImport`. The same file gives the same objects. `If-Match` may name the draft that it is taken on.
          *
          *     A model as JSON-FG (`application/fg+json`: a `GdbDocument`, as `exports/jsonfg` gives it) goes there too, and its prototypes
-         *     into the library of the site, of which no prototype is changed: one whose name is taken gets a name of its own. The
-         *     answer is a `ModelImport`, which tells what was left out, and why.
+         *     into the library of the site, of which no prototype is changed: one whose name is taken gets a name of its own. So does
+         *     a drawing (ASCII DXF, `image/vnd.dxf`): walls of pairs of parallel lines, doorways of swings of doors, blocks as
+         *     prototypes. The answer is a `ModelImport`, which tells what was left out, and why.
          */
         post: operations["import"];
         /**
@@ -1709,7 +1711,7 @@ export interface components {
          * @description Formats that a model comes in as.
          * @enum {string}
          */
-        ModelFormat: "jsonfg";
+        ModelFormat: "jsonfg" | "dxf";
         /** @description The answer to the import of a model: what was found, and what became of it. */
         ModelImport: {
             answer?: components["schemas"]["GdbAnswer"] | null;
@@ -3139,7 +3141,7 @@ export interface operations {
                 bbox?: string;
                 /** @description `geojson`: `map` (what robots saw, the default), `gdb` (the plan of the a-priori model, and its landmarks) or `all`. */
                 of?: "map" | "gdb" | "all";
-                /** @description `jsonfg`, and `geojson` of the model: `draft` (if absent) or `published`. */
+                /** @description `jsonfg`, `dxf`, and `geojson` of the model: `draft` (if absent) or `published`. */
                 state?: "draft" | "published";
                 /** @description `geojson` of the model: the height that it is cut at; 0.3 if absent. */
                 height_m?: number;
@@ -3148,7 +3150,7 @@ export interface operations {
             path: {
                 site: string;
                 level: string;
-                /** @description `geojson`, `nav2` or `jsonfg` */
+                /** @description `geojson`, `nav2`, `jsonfg` or `dxf` */
                 format: string;
             };
             cookie?: never;
@@ -3164,6 +3166,7 @@ export interface operations {
                     "application/geo+json": Record<string, never>;
                     "application/fg+json": components["schemas"]["GdbDocument"];
                     "application/zip": number[];
+                    "image/vnd.dxf": number[];
                 };
             };
             /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
@@ -3716,6 +3719,15 @@ export interface operations {
                 building_level?: string;
                 /** @description Of a building or a model, `true`: what is in the draft of the GDB and not in the file goes. */
                 replace?: boolean;
+                /**
+                 * @description Of a drawing: which layer is what, before the table of names after AIA and NCS: `PATTERN=KIND,...`, where a star stands
+                 *     for any letters, and a kind may be `skip`.
+                 */
+                layers?: string;
+                /** @description Of a drawing: metres of one unit, if what it says itself is not so. */
+                unit_m?: number;
+                /** @description Of a drawing: height of walls that are drawn flat; 2.5 if absent. */
+                wall_height_m?: number;
             };
             header?: never;
             path: {

@@ -115,6 +115,19 @@ impl Solid {
         Self::Box { from: from.into(), to: to.into() }
     }
 
+    /// The same by its faces: short forms as the prisms that they stand for.
+    pub fn polyhedron(&self) -> Polyhedron {
+        match self {
+            Self::Polyhedron(polyhedron) => polyhedron.clone(),
+            Self::Box { from, to } => {
+                let corners = [[from.x, from.y], [to.x, from.y], [to.x, to.y], [from.x, to.y]];
+                drawn_up(&Polygon::simple(corners), from.z, to.z)
+            }
+            Self::Prism { base, lower, upper } => drawn_up(base, *lower, *upper),
+            Self::Cylinder(cylinder) => drawn_up(&cylinder.base(), cylinder.lower, cylinder.upper),
+        }
+    }
+
     /// The solid placed on the grid; `None` if some vertex is out of reach or a face names a vertex
     /// that is not there. Short forms upside down (`lower` above `upper`) give none either.
     pub(super) fn mesh(&self, placement: &Placement) -> Option<Mesh> {
@@ -145,6 +158,32 @@ impl Polyhedron {
             |loops: &Vec<Vec<u32>>| loops.iter().flatten().all(|v| (*v as usize) < vertices.len());
         faces.iter().all(known).then(|| Mesh::new(vertices, faces))
     }
+}
+
+/// A polygon drawn up: side faces ring by ring, then the lower and the upper one.
+fn drawn_up(base: &Polygon, lower: f64, upper: f64) -> Polyhedron {
+    let mut drawn = Polyhedron::default();
+    let (mut floor, mut ceiling) = (Vec::new(), Vec::new());
+    for ring in base.rings() {
+        let (first, count) = (drawn.vertices.len() as u32, ring.len() as u32);
+        for p in &ring {
+            drawn.vertices.push(Point3::new(p.x, p.y, lower));
+            drawn.vertices.push(Point3::new(p.x, p.y, upper));
+        }
+        let at = |k: u32| first + 2 * (k % count);
+        drawn
+            .faces
+            .extend((0..count).map(|k| Face::simple([at(k), at(k + 1), at(k + 1) + 1, at(k) + 1])));
+        floor.push((0..count).rev().map(at).collect::<Vec<u32>>());
+        ceiling.push((0..count).map(|k| at(k) + 1).collect::<Vec<u32>>());
+    }
+    for mut rings in [floor, ceiling] {
+        if !rings.is_empty() {
+            let holes = rings.split_off(1);
+            drawn.faces.push(Face { outer: rings.swap_remove(0), holes });
+        }
+    }
+    drawn
 }
 
 /// The faces of a polygon that is drawn up: side faces ring by ring, then the lower and the upper one.
@@ -183,6 +222,29 @@ mod tests {
             let sides = cylinder.sides() as f64;
             assert!(sagitta(sides) <= chord_error * (1.0 + 1e-12), "{radius} {sides}");
             assert!(sagitta(sides - 1.0) > chord_error, "{radius} {sides}");
+        }
+    }
+
+    #[test]
+    fn the_faces_of_a_short_form_are_those_that_plans_are_cut_from() {
+        let hole = [[1.0, 1.0], [2.0, 1.0], [2.0, 2.0]].map(Point::from).to_vec();
+        let mut base = Polygon::simple([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]]);
+        base.holes.push(hole);
+        let placement = Placement::upright(Point3::new(1.0, 2.0, 0.5), 0.3);
+        for solid in [
+            Solid::cuboid([0.0, -1.0, 0.5], [2.0, 1.0, 2.5]),
+            Solid::Prism { base, lower: 0.0, upper: 2.0 },
+            Solid::Cylinder(Cylinder {
+                centre: Point::new(1.0, 1.0),
+                radius: 0.4,
+                lower: 0.0,
+                upper: 1.0,
+                chord_error: 0.01,
+            }),
+        ] {
+            let by_faces = Solid::Polyhedron(solid.polyhedron());
+            assert_eq!(by_faces.mesh(&placement), solid.mesh(&placement));
+            assert!(solid.mesh(&placement).is_some_and(|mesh| mesh.closed));
         }
     }
 

@@ -42,6 +42,8 @@ pub struct GdbDocument {
 pub enum ModelFormat {
     /// JSON-FG.
     Jsonfg,
+    /// A drawing (DXF).
+    Dxf,
 }
 
 /// Objects of one kind.

@@ -151,7 +151,7 @@ pub(super) struct ExportCommand {
 #[derive(Debug, Args)]
 pub(super) struct ImportCommand {
     /// The YAML of a `map_server` map, with its image beside it; or a zip of both; or a `*.building.yaml` of Open-RMF; or a
-    /// model as JSON-FG (`*.json`)
+    /// model as JSON-FG (`*.json`) or a drawing (`*.dxf`)
     pub(super) file: PathBuf,
     /// Slug of the site
     #[arg(long)]
@@ -171,6 +171,22 @@ pub(super) struct ImportCommand {
     /// Only tell what is in it
     #[arg(long)]
     pub(super) preview: bool,
+    #[command(flatten)]
+    pub(super) drawing: DrawingOptions,
+}
+
+/// Of drawings only: how they are read.
+#[derive(Debug, Args)]
+pub(super) struct DrawingOptions {
+    /// Of a drawing: which layer is what, before the standard names: `S-WALL*=wall,A-CASE*=skip`
+    #[arg(long, value_name = "PATTERN=KIND,...")]
+    pub(super) layers: Option<String>,
+    /// Of a drawing: metres of one unit [default: what it says itself]
+    #[arg(long)]
+    pub(super) unit_m: Option<f64>,
+    /// Of a drawing: height of walls that are drawn flat [default: 2.5]
+    #[arg(long)]
+    pub(super) wall_height_m: Option<f64>,
 }
 
 /// Of nav2 only: what is drawn, and how.
@@ -238,6 +254,8 @@ pub(super) enum ExportFormat {
     Nav2,
     /// The model, with the prototypes that it uses, whole
     Jsonfg,
+    /// The model as a drawing
+    Dxf,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

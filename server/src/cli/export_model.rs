@@ -9,8 +9,8 @@ use super::export::to_file;
 use super::import::refused;
 use super::import_building::unreadable;
 use super::{CommandError, say};
-use crate::exchange::jsonfg;
 use crate::exchange::outgoing::Outgoing;
+use crate::exchange::{dxf, jsonfg};
 use crate::level::gdb::{GdbModel, HEIGHT_M, read_model};
 use crate::level::{LevelHandle, Snapshot};
 use crate::store::Store;
@@ -37,6 +37,7 @@ pub(super) async fn write(
     let outgoing = outgoing(&model, level);
     match command.format {
         ExportFormat::Jsonfg => to_file(&command.out, |file| jsonfg::write(outgoing, file))?,
+        ExportFormat::Dxf => to_file(&command.out, |file| dxf::write(outgoing, file))?,
         ExportFormat::Geojson | ExportFormat::Nav2 => {
             let height_m = command.height_m.unwrap_or(HEIGHT_M);
             let landmarks = model.landmarks(height_m).map_err(unreadable)?;

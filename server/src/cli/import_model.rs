@@ -9,7 +9,7 @@ use mapfold_map::gdb::Severity;
 use mapfold_schema::border::gdb::OBJECTS_MAX;
 use mapfold_schema::v1::{ModelFormat, ModelReport};
 
-use super::args::ImportCommand;
+use super::args::{DrawingOptions, ImportCommand};
 use super::import::{AUTHOR, bytes_of, refused};
 use super::import_building::{TOLD_MAX, unreadable};
 use super::{CommandError, say};
@@ -17,7 +17,7 @@ use crate::chance::Chance;
 use crate::clock::{Clock as _, SystemClock};
 use crate::config::Config;
 use crate::exchange::incoming::{FILE_BYTES_MAX, Incoming};
-use crate::exchange::jsonfg;
+use crate::exchange::{dxf, jsonfg};
 use crate::level::gdb::{column, read_model};
 use crate::running::{StartError, open_existing_store};
 use crate::store::gdb::{Expected, GdbChange, GdbOutcome, GdbVersion, NewGdbEntry};
@@ -28,6 +28,7 @@ pub(super) fn format_of(path: &Path) -> Option<ModelFormat> {
     let end = path.extension()?.to_string_lossy().to_ascii_lowercase();
     match end.as_str() {
         "json" | "jsonfg" | "geojson" => Some(ModelFormat::Jsonfg),
+        "dxf" => Some(ModelFormat::Dxf),
         _ => None,
     }
 }
@@ -46,6 +47,11 @@ pub(super) async fn run(
     let draft = read_model(&store, site, name, state.draft).await.map_err(unreadable)?;
     let read = match format {
         ModelFormat::Jsonfg => jsonfg::read(&bytes, level.frame, draft.library()),
+        ModelFormat::Dxf => {
+            let DrawingOptions { layers, unit_m, wall_height_m } = &command.drawing;
+            let options = dxf::Options::new(layers.as_deref(), *unit_m, *wall_height_m);
+            dxf::read(&bytes, level.frame, draft.library(), &options.map_err(refused)?)
+        }
     };
     let Incoming { objects, prototypes, report } = read.map_err(|e| refused(e.to_string()))?;
     tell(&report)?;

@@ -8,17 +8,19 @@ use std::collections::{BTreeMap, BTreeSet};
 use mapfold_map::gdb::{Model, Structure};
 use mapfold_schema::border::Violation;
 use mapfold_schema::border::gdb::{
-    NAME_LENGTH_MAX, PROTOTYPES_MAX, VERTICES_MAX, map_object, map_prototype, object_id,
-    vertex_count,
+    NAME_LENGTH_MAX, OBJECTS_MAX, PROTOTYPES_MAX, VERTICES_MAX, map_object, map_prototype,
+    object_id, vertex_count,
 };
 use mapfold_schema::v1::{
-    Bounds, GdbObject, GdbPrototype, KindCount, ModelFormat, ModelReport, ObjectKind,
+    Bounds, GdbObject, GdbPrototype, KindCount, LeftOut, ModelFormat, ModelReport, ObjectKind,
 };
 use sha2::{Digest, Sha256};
 use uuid::Uuid;
 
 /// Longest file of a model, bytes.
 pub const FILE_BYTES_MAX: usize = 64 << 20;
+/// Reasons for what is left out that are told.
+const LEFT_OUT_MAX: usize = 64;
 
 /// Why a file is not taken: what is wrong, and where.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -65,14 +67,17 @@ pub(super) struct Found {
     pub(super) objects: BTreeMap<Uuid, GdbObject>,
     pub(super) prototypes: BTreeMap<String, GdbPrototype>,
     pub(super) warnings: Vec<String>,
+    left_out: BTreeMap<(String, String), u32>,
+    frame: Uuid,
+    digest: [u8; 32],
 }
 
 impl Found {
-    /// Nothing yet, in a file of `bytes`.
+    /// Nothing yet, in a file of `bytes` that is taken into the level of `frame`.
     ///
     /// # Errors
     /// The file is longer than any is.
-    pub(super) fn new(format: ModelFormat, bytes: &[u8]) -> Result<Self, FileFault> {
+    pub(super) fn new(format: ModelFormat, frame: Uuid, bytes: &[u8]) -> Result<Self, FileFault> {
         if bytes.len() > FILE_BYTES_MAX {
             let fault =
                 format!("{} bytes; {FILE_BYTES_MAX} are the most that one has", bytes.len());
@@ -84,7 +89,60 @@ impl Found {
             objects: BTreeMap::new(),
             prototypes: BTreeMap::new(),
             warnings: Vec::new(),
+            left_out: BTreeMap::new(),
+            frame,
+            digest: Sha256::digest(bytes).into(),
         })
+    }
+
+    /// Puts an object, under the identity that the file gives it or one that is the same for the same file.
+    ///
+    /// # Errors
+    /// It is none that a model may hold, or one too many.
+    pub(super) fn put(
+        &mut self,
+        place: &str,
+        id: Option<Uuid>,
+        mut object: GdbObject,
+    ) -> Result<(), FileFault> {
+        object.name = short_name(&object.name);
+        if let Err(wrong) = map_object(&object) {
+            return Err(unfit(place, &wrong));
+        }
+        if self.objects.len() >= OBJECTS_MAX {
+            return Err(FileFault::at(place, format!("a level has at most {OBJECTS_MAX} objects")));
+        }
+        let id = id.filter(|id| !self.objects.contains_key(id));
+        self.objects.insert(id.unwrap_or_else(|| self.identity(place)), object);
+        Ok(())
+    }
+
+    /// Puts a prototype.
+    ///
+    /// # Errors
+    /// It is none that a library may hold.
+    pub(super) fn put_prototype(
+        &mut self,
+        place: &str,
+        name: &str,
+        prototype: GdbPrototype,
+    ) -> Result<(), FileFault> {
+        if let Err(wrong) = map_prototype(&prototype) {
+            return Err(unfit(place, &wrong));
+        }
+        self.prototypes.insert(name.to_owned(), prototype);
+        Ok(())
+    }
+
+    /// Notes that something is not taken.
+    pub(super) fn leave_out(&mut self, what: impl Into<String>, why: impl Into<String>) {
+        let key = (what.into(), why.into());
+        if self.left_out.len() < LEFT_OUT_MAX || self.left_out.contains_key(&key) {
+            *self.left_out.entry(key).or_default() += 1;
+        } else {
+            let rest = ("other things".to_owned(), "there are too many kinds to tell".to_owned());
+            *self.left_out.entry(rest).or_default() += 1;
+        }
     }
 
     /// All that was found. A prototype whose name means another one in `library` gets a name of its own.
@@ -147,6 +205,7 @@ impl Found {
         let count =
             |kind| self.objects.values().filter(|object| object.kind == kind).count() as u32;
         let kinds = kinds.map(|kind| KindCount { kind, count: count(kind) });
+        let left_out = std::mem::take(&mut self.left_out);
         ModelReport {
             format: self.format,
             scale_m: self.scale_m,
@@ -159,7 +218,10 @@ impl Found {
                 max_x_m: to.x,
                 max_y_m: to.y,
             }),
-            left_out: Vec::new(),
+            left_out: left_out
+                .into_iter()
+                .map(|((what, why), count)| LeftOut { what, count, why })
+                .collect(),
             warnings: std::mem::take(&mut self.warnings),
         }
     }
@@ -193,6 +255,23 @@ impl Found {
         }
         Ok(model)
     }
+
+    fn identity(&self, place: &str) -> Uuid {
+        let digest = Sha256::new()
+            .chain_update("model file")
+            .chain_update(self.frame)
+            .chain_update(self.digest)
+            .chain_update(place)
+            .finalize();
+        let mut bytes = [0; 16];
+        bytes.copy_from_slice(&digest[..16]);
+        uuid::Builder::from_custom_bytes(bytes).into_uuid()
+    }
+}
+
+fn unfit(place: &str, wrong: &[Violation]) -> FileFault {
+    let fault = wrong.first().map(|v| format!("cannot be taken: {}: {}", v.pointer, v.detail));
+    FileFault::at(place, fault.unwrap_or_default())
 }
 
 /// A name without control characters, of at most the length that a name may have.
@@ -214,4 +293,18 @@ fn other_name(name: &str, prototype: &GdbPrototype) -> String {
         other.pop();
     }
     other + &suffix
+}
+
+/// An object of a kind with nothing said of it yet.
+pub(super) fn object(kind: ObjectKind, name: &str) -> GdbObject {
+    GdbObject {
+        name: short_name(name),
+        kind,
+        solids: None,
+        prototype: None,
+        placement: None,
+        tolerance_m: None,
+        trust: None,
+        door: None,
+    }
 }

@@ -52,7 +52,7 @@ pub fn read(
     frame: Uuid,
     library: &BTreeMap<String, GdbPrototype>,
 ) -> Result<Incoming, FileFault> {
-    let mut found = Found::new(ModelFormat::Jsonfg, bytes)?;
+    let mut found = Found::new(ModelFormat::Jsonfg, frame, bytes)?;
     let document: GdbDocument = codec::from_json(bytes).map_err(|error| match error {
         DecodeError::Shape(violation) => FileFault::of(vec![violation]),
         other => FileFault::at("the document", other.to_string()),

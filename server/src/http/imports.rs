@@ -18,8 +18,8 @@ use super::problem::ApiError;
 use super::query::{QueryOf, before, page_limit};
 use super::state::App;
 use crate::auth;
-use crate::exchange::jsonfg;
 use crate::exchange::nav2::{Package, Trust};
+use crate::exchange::{dxf, jsonfg};
 use crate::level::gdb::WireLibrary;
 use crate::store::imports::NewImport;
 
@@ -43,6 +43,21 @@ pub(super) struct ImportQuery {
     /// Of a building or a model, `true`: what is in the draft of the GDB and not in the file goes.
     #[serde(default)]
     replace: bool,
+    /// Of a drawing: which layer is what, before the table of names after AIA and NCS: `PATTERN=KIND,...`, where a star stands
+    /// for any letters, and a kind may be `skip`.
+    layers: Option<String>,
+    /// Of a drawing: metres of one unit, if what it says itself is not so.
+    unit_m: Option<f64>,
+    /// Of a drawing: height of walls that are drawn flat; 2.5 if absent.
+    wall_height_m: Option<f64>,
+}
+
+impl ImportQuery {
+    /// How a drawing is read.
+    fn drawing(&self) -> Result<dxf::Options, ApiError> {
+        dxf::Options::new(self.layers.as_deref(), self.unit_m, self.wall_height_m)
+            .map_err(ApiError::Query)
+    }
 }
 
 /// Which imports are asked for.
@@ -73,8 +88,9 @@ pub(super) struct PageQuery {
 /// `BuildingImport`. The same file gives the same objects. `If-Match` may name the draft that it is taken on.
 ///
 /// A model as JSON-FG (`application/fg+json`: a `GdbDocument`, as `exports/jsonfg` gives it) goes there too, and its prototypes
-/// into the library of the site, of which no prototype is changed: one whose name is taken gets a name of its own. The
-/// answer is a `ModelImport`, which tells what was left out, and why.
+/// into the library of the site, of which no prototype is changed: one whose name is taken gets a name of its own. So does
+/// a drawing (ASCII DXF, `image/vnd.dxf`): walls of pairs of parallel lines, doorways of swings of doors, blocks as
+/// prototypes. The answer is a `ModelImport`, which tells what was left out, and why.
 #[utoipa::path(
     post, path = route::IMPORTS, operation_id = "import", tag = "map",
     params(("site" = String, Path), ("level" = String, Path), ImportQuery),
@@ -94,7 +110,8 @@ pub(super) async fn create(
     headers: HeaderMap,
     request: Request,
 ) -> Result<Response, ApiError> {
-    let ImportQuery { preview, trust, building_level, replace } = query;
+    let drawing = query.drawing()?;
+    let ImportQuery { preview, trust, building_level, replace, .. } = query;
     let trust = trust.map_or(Some(Trust::STANDARD), Trust::new);
     let trust = trust.ok_or_else(|| ApiError::Query("`trust` is from 0 to 1.".to_owned()))?;
     let sent = media_type(&headers).unwrap_or_default();
@@ -112,6 +129,7 @@ pub(super) async fn create(
         let taking = model_imports::Taking { preview, replace };
         let read = move |frame, library: &WireLibrary| match format {
             ModelFormat::Jsonfg => jsonfg::read(&bytes, frame, library),
+            ModelFormat::Dxf => dxf::read(&bytes, frame, library, &drawing),
         };
         return model_imports::take(&app, &level, taking, &reader, &headers, read).await;
     }

@@ -13,8 +13,8 @@ use super::answer::{Offer, Reader};
 use super::gdb::StateName;
 use super::problem::ApiError;
 use super::state::App;
-use crate::exchange::jsonfg;
 use crate::exchange::outgoing::Outgoing;
+use crate::exchange::{dxf, jsonfg};
 use crate::level::Snapshot;
 use crate::level::gdb::GdbModel;
 
@@ -38,18 +38,21 @@ pub(super) enum Content {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Format {
     Jsonfg,
+    Dxf,
 }
 
 impl Format {
     pub(super) fn offer(self) -> &'static Offer {
         match self {
             Self::Jsonfg => JSONFG,
+            Self::Dxf => &[dxf::MEDIA_TYPE],
         }
     }
 
     pub(super) fn extension(self) -> &'static str {
         match self {
             Self::Jsonfg => "json",
+            Self::Dxf => "dxf",
         }
     }
 }
@@ -72,6 +75,7 @@ pub(super) async fn whole(
         let model = outgoing(&model, frame);
         let written = match format {
             Format::Jsonfg => jsonfg::write(model, &mut bytes),
+            Format::Dxf => dxf::write(model, &mut bytes),
         };
         written.map_err(|error| failed(&error))?;
         Ok(bytes)

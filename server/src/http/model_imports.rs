@@ -17,22 +17,22 @@ use super::problem::gdb::GdbRefusal;
 use super::state::App;
 use crate::auth;
 use crate::exchange::incoming::{FileFault, Incoming};
-use crate::exchange::jsonfg;
+use crate::exchange::{dxf, jsonfg};
 use crate::level::gdb::{WireLibrary, column};
 use crate::store::gdb::{Expected, GdbChange, GdbVersion};
 use crate::store::library::LibraryOutcome;
 
 /// What models are sent as.
-const TYPES: [(&str, ModelFormat); 3] = [
-    (jsonfg::MEDIA_TYPE, ModelFormat::Jsonfg),
-    (geojson::MEDIA_TYPE, ModelFormat::Jsonfg),
-    ("application/json", ModelFormat::Jsonfg),
+const FORMATS: [(&[&str], ModelFormat); 2] = [
+    (&[jsonfg::MEDIA_TYPE, geojson::MEDIA_TYPE, "application/json"], ModelFormat::Jsonfg),
+    (&dxf::MEDIA_TYPES, ModelFormat::Dxf),
 ];
 
 /// The format of a body of this type, if it is a model.
 pub(super) fn format_of(media_type: &str) -> Option<ModelFormat> {
     let essence = media_type.split(';').next().unwrap_or_default().trim();
-    let known = TYPES.iter().find(|(name, _)| essence.eq_ignore_ascii_case(name));
+    let is = |name: &&str| essence.eq_ignore_ascii_case(name);
+    let known = FORMATS.iter().find(|(names, _)| names.iter().any(is));
     known.map(|(_, format)| *format)
 }
 

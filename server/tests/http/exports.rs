@@ -223,7 +223,7 @@ async fn a_map_without_evidence_has_no_image_and_an_unknown_format_is_none() {
     let floor = Level::create(&server.admin()).await;
     let path = |format| floor.path(route::EXPORTS).replace("{format}", format);
     assert_eq!(server.admin().get(&path("nav2")).await.code(409), "map_empty");
-    assert_eq!(server.admin().get(&path("dxf")).await.code(404), "format_not_found");
+    assert_eq!(server.admin().get(&path("svg")).await.code(404), "format_not_found");
     let empty = server.admin().get(&path("geojson")).await.expect(200);
     let empty: serde_json::Value = serde_json::from_slice(&empty.body).unwrap();
     assert_eq!(empty["features"], serde_json::json!([]));

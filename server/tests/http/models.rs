@@ -237,6 +237,42 @@ async fn the_plan_of_a_model_goes_out_as_geojson_with_its_landmarks() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_model_goes_out_as_a_drawing_and_comes_in_again() {
+    const DXF: &str = "image/vnd.dxf";
+    let server = Server::start().await;
+    let here = Level::create(&server.admin()).await;
+    drawn(&here).await;
+    let path = here.path(route::EXPORTS).replace("{format}", "dxf");
+    let answer = here.client.get(&path).await.expect(200);
+    assert_eq!(answer.header("content-type"), DXF);
+    assert_eq!(answer.header("content-disposition"), "attachment; filename=\"plant-floor.dxf\"");
+    let there = Level::create_at(&server.admin(), "other", "hall").await;
+    let told: ModelImport =
+        import(&there, "?preview=true", DXF, answer.body.clone()).await.expect(200).data();
+    // Not the instance of what nobody has.
+    assert_eq!(told.preview.unwrap().new, 5);
+    let made = import(&there, "", "application/dxf", answer.body.clone()).await.expect(201);
+    let made: ModelImport = made.data();
+    assert_eq!((made.report.prototypes, made.report.instances), (vec!["table".to_owned()], 1));
+    let again: ModelImport = import(&there, "", DXF, answer.body).await.expect(200).data();
+    assert_eq!(again.answer.unwrap().entry, None);
+    let plan = |floor: &Level| {
+        let path = floor.path(route::EXPORTS).replace("{format}", "geojson");
+        let (client, path) = (floor.client.clone(), format!("{path}?of=gdb&height_m=1"));
+        async move { features_of::<Value>(&client.get(&path).await.expect(200)) }
+    };
+    assert_eq!(plan(&here).await, plan(&there).await);
+
+    let refused = import(&there, "", DXF, b"0\nSECTION\n2\nENTITIES\n0\nLINE\n".to_vec()).await;
+    let problem = refused.problem(422);
+    assert_eq!(problem.code, "invalid_model_file");
+    assert!(problem.detail.starts_with("Line 6: "), "{}", problem.detail);
+    for query in ["?layers=x", "?unit_m=-1", "?wall_height_m=1000"] {
+        assert_eq!(import(&there, query, DXF, Vec::new()).await.code(400), "query_invalid");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn what_is_no_model_is_refused_with_its_place_and_changes_nothing() {
     let server = Server::start().await;
     let floor = Level::create(&server.admin()).await;
