@@ -4,7 +4,7 @@
 //! [`correction`] makes ranges of readings, for scanners with a table; [`points`] gives positions
 //! with covariance; [`breakpoints`] groups beams that may lie on one surface; [`split`] proposes
 //! lines by Iterative End Point Fit, confirms them by least squares (`cloud`, `guess`, `explain`),
-//! joins them, and settles which are walls (`settle`); [`fit`] is the weighted total least squares
+//! joins them, and settles which are walls (`settle`), from sums that are kept (`tally`); [`fit`] is the weighted total least squares
 //! behind it, [`hedge`] what it owes to points that may be another wall's; [`ends`] says where and what the ends of a wall are; [`seen_through`] says where beams
 //! went through its line beside it; [`clusters`] gathers what no line explains.
 //!
@@ -27,6 +27,7 @@ pub mod seen_through;
 mod segment;
 mod settle;
 pub mod split;
+mod tally;
 
 use std::ops::Range;
 
@@ -135,7 +136,7 @@ pub struct Extractor {
     directions: Directions,
     states: Vec<BeamState>,
     cloud: Cloud,
-    gaps: Vec<Gap>,
+    gaps: Vec<(usize, Gap)>,
     runs: Vec<Range<usize>>,
     splitter: Splitter,
     lines: Vec<FoundLine>,
@@ -225,16 +226,17 @@ impl Extractor {
         if let Some(noise) = noise {
             points::with_noise(&mut self.cloud.points, noise);
         }
+        self.cloud.index(noise.is_some());
         let ring = Ring { closed: scan.is_full_circle(), beams: scan.ranges.len() };
         breakpoints::find_runs(
-            &mut self.cloud.points,
+            &mut self.cloud,
             ring,
             increment,
             &config.breakpoints,
             &mut self.gaps,
             &mut self.runs,
         );
-        self.cloud.index();
+        self.cloud.sum();
         self.lines.clear();
         self.loose.clear();
         self.splitter.begin(self.cloud.points.len());
@@ -271,30 +273,44 @@ impl Extractor {
         }));
         let points = &self.cloud.points;
         let directions = self.directions.of(scan);
-        seen_through::blocks(&self.lines, &self.loose, &mut self.blocks);
+        seen_through::blocks(&self.cloud, &self.lines, &self.loose, &mut self.blocks);
         let view = ends::View { points, directions, runs: &self.runs, ring, config: &config.ends };
         let sweep = seen_through::Sweep {
-            points,
-            at: &self.cloud.at,
+            cloud: &self.cloud,
             blocks: &self.blocks,
             ring,
             increment: scan.geometry.increment,
         };
         let mount = Mount::of(scan);
+        // Lines, runs and blocks all ascend, and every line lies in a run and is a block.
+        let (mut run, mut block) = (0, 0);
         for (i, line) in self.lines.iter().enumerate() {
-            let Some(ended) = view.ends(&self.lines, i) else { continue };
-            let mut count = 0;
-            for at in line.points.clone() {
-                if !self.splitter.stray[at] {
-                    beams[points[at].beam] = BeamUse::Segment(segments.len() as u32);
-                    count += 1;
+            while self.runs[run].end <= line.first() {
+                run += 1;
+            }
+            while self.blocks[block].points.start < line.first() {
+                block += 1;
+            }
+            let Some(ended) = view.ends(&self.lines, i, run) else { continue };
+            let own = BeamUse::Segment(segments.len() as u32);
+            let (first, last) = (points[line.first()].beam, points[line.last()].beam);
+            let mut count = line.points.len();
+            if !line.has_strays && last + 1 == first + count {
+                beams[first..=last].fill(own);
+            } else {
+                count = 0;
+                for at in line.points.clone() {
+                    if !(line.has_strays && self.splitter.stray[at]) {
+                        beams[points[at].beam] = own;
+                        count += 1;
+                    }
                 }
             }
             let room = || Vec::with_capacity(2 * config.seen_through.stretches_max);
             let seen_through = self.spare.pop().unwrap_or_else(room);
             segments.push(segment::in_robot_frame(
                 line,
-                count,
+                (block, count),
                 &ended,
                 &mount,
                 &sweep,

@@ -13,7 +13,7 @@ pub use angle::{difference, wrap};
 pub use chi_square::chi_square_quantile;
 pub use covariance::{Covariance, CovarianceError, mahalanobis_sq};
 pub use frame::{Level, Odom, Robot, Sensor};
-pub use hull::{convex_hull, convex_hull_into, distance_to_hull};
+pub use hull::{convex_hull, convex_hull_into, convex_hull_of_sweep, distance_to_hull};
 pub use interval::{Interval, subtract_intervals, union_intervals};
 pub(crate) use line::{Axes, offset_variance};
 pub use line::{Line, MovedLine, UncertainLine, tangent, unit_normal};

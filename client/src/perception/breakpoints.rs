@@ -13,6 +13,7 @@ use std::ops::Range;
 
 use mapfold_map::geometry::Point;
 
+use super::cloud::{Cloud, Columns};
 use super::points::ScanPoint;
 
 /// How many beams without a point break a surface: both so many, and so wide a turn of them. The finer a
@@ -114,49 +115,66 @@ pub(super) enum Gap {
 
 /// Finds the runs of points that may each lie on one surface. The points of a closed scan are
 /// turned so that no run straddles their end; a run that has neither beginning nor end begins
-/// at its outermost point, which is never within a wall. `gaps` is room to work in.
+/// at its outermost point, which is never within a wall. `gaps` is room to work in: the points whose next
+/// one is not near, and why.
 pub(super) fn find_runs(
-    points: &mut [ScanPoint],
+    cloud: &mut Cloud,
     ring: Ring,
     increment: f64,
     config: &BreakpointConfig,
-    gaps: &mut Vec<Gap>,
+    gaps: &mut Vec<(usize, Gap)>,
     runs: &mut Vec<Range<usize>>,
 ) {
     gaps.clear();
+    // Room for any other scan: how many gaps there are is chance.
+    gaps.reserve(ring.beams);
     runs.clear();
+    let points = &cloud.points;
     let count = points.len();
     if count == 0 {
         return;
     }
     let reach = Reach::new(increment, config);
-    gaps.extend(points.windows(2).map(|pair| reach.gap(&pair[0], &pair[1], ring, config)));
-    gaps.push(match count {
+    reach.ask(cloud, config, |i| {
+        let gap = reach.gap(&points[i], &points[i + 1], ring, config);
+        if gap != Gap::Near {
+            gaps.push((i, gap));
+        }
+    });
+    let last = match count {
         1 => Gap::Apart,
         _ => reach.gap(&points[count - 1], &points[0], ring, config),
-    });
-    for i in 0..count {
-        if gaps[i] == Gap::Wide {
-            let bridged = is_bridged(points, gaps, i, config);
-            gaps[i] = if bridged { Gap::Bridged } else { Gap::Open };
+    };
+    if last != Gap::Near {
+        gaps.push((count - 1, last));
+    }
+    for at in 0..gaps.len() {
+        if gaps[at].1 == Gap::Wide {
+            let bridged = is_bridged(points, gaps, gaps[at].0, config);
+            gaps[at].1 = if bridged { Gap::Bridged } else { Gap::Open };
         }
     }
-    let ends = |gap: &Gap| matches!(gap, Gap::Open | Gap::Apart);
+    let ends = |gap: &&(usize, Gap)| matches!(gap.1, Gap::Open | Gap::Apart);
     let start = if ring.closed {
-        gaps.iter().rposition(ends).map_or_else(|| outermost(points), |last| (last + 1) % count)
+        gaps.iter().rfind(ends).map_or_else(|| outermost(points), |last| (last.0 + 1) % count)
     } else {
         0
     };
     if start > 0 {
-        points.rotate_left(start);
-        gaps.rotate_left(start);
+        cloud.turn(start);
+        let turned = gaps.partition_point(|gap| gap.0 < start);
+        gaps.rotate_left(turned);
+        for gap in &mut *gaps {
+            gap.0 = (gap.0 + count - start) % count;
+        }
     }
     let mut from = 0;
-    for (i, gap) in gaps.iter().enumerate() {
-        if ends(gap) || i + 1 == count {
-            runs.push(from..i + 1);
-            from = i + 1;
-        }
+    for (last, _) in gaps.iter().filter(ends) {
+        runs.push(from..last + 1);
+        from = last + 1;
+    }
+    if from < count {
+        runs.push(from..count);
     }
 }
 
@@ -181,34 +199,43 @@ impl Reach {
         }
     }
 
-    fn gap(&self, a: &ScanPoint, b: &ScanPoint, ring: Ring, config: &BreakpointConfig) -> Gap {
-        let distance_sq = (b.at - a.at).norm_squared();
-        let near = (self.surface * a.range).min(config.gap_cap);
-        // Most neighbours are so close that nothing else need be asked.
-        if b.beam == a.beam + 1 {
-            if distance_sq <= near * near {
-                return Gap::Near;
+    /// Asks of every point but those whose next one is surely near: of the next beam, and so close that nothing
+    /// else need be asked. Most are. Several are looked at together, without a branch for each.
+    fn ask(&self, cloud: &Cloud, config: &BreakpointConfig, mut ask: impl FnMut(usize)) {
+        const TOGETHER: usize = 8;
+        let Columns { x, y, along, .. } = &cloud.columns;
+        // A square of a sum is no less than the sum of the squares, which needs no root.
+        let surface_sq = self.surface * self.surface;
+        let noise_sq = config.gap_sds * config.gap_sds;
+        let cap_sq = config.gap_cap * config.gap_cap;
+        let mut skips = cloud.skips.iter().copied().peekable();
+        let mut from = 0;
+        while from + TOGETHER < x.len() {
+            let [x, y, along] = [x, y, along].map(|column| &column[from..=from + TOGETHER]);
+            let far: [bool; TOGETHER] = std::array::from_fn(|k| {
+                let (dx, dy) = (x[k + 1] - x[k], y[k + 1] - y[k]);
+                let range_sq = x[k] * x[k] + y[k] * y[k];
+                let near = surface_sq * range_sq + noise_sq * (along[k] + along[k + 1]);
+                let near = if near < cap_sq { near } else { cap_sq };
+                dx * dx + dy * dy > near
+            });
+            let skipped = skips.peek().is_some_and(|skip| *skip < from + TOGETHER);
+            if far.iter().fold(skipped, |any, far| any | far) {
+                for (k, far) in far.into_iter().enumerate() {
+                    if skips.next_if_eq(&(from + k)).is_some() || far {
+                        ask(from + k);
+                    }
+                }
             }
-            // A square of a sum is no less than the sum of the squares, which needs no root.
-            let noise_sq = config.gap_sds * config.gap_sds * (a.variance_along + b.variance_along);
-            if distance_sq <= near * near + noise_sq
-                && distance_sq <= config.gap_cap * config.gap_cap
-            {
-                return Gap::Near;
-            }
+            from += TOGETHER;
         }
-        self.wider_gap(a, b, distance_sq, ring, config)
+        for i in from..x.len().saturating_sub(1) {
+            ask(i);
+        }
     }
 
-    #[cold]
-    fn wider_gap(
-        &self,
-        a: &ScanPoint,
-        b: &ScanPoint,
-        distance_sq: f64,
-        ring: Ring,
-        config: &BreakpointConfig,
-    ) -> Gap {
+    fn gap(&self, a: &ScanPoint, b: &ScanPoint, ring: Ring, config: &BreakpointConfig) -> Gap {
+        let distance_sq = (b.at - a.at).norm_squared();
         let Some(steps) = ring.steps(a.beam, b.beam).filter(|s| *s <= self.steps_max) else {
             return Gap::Apart;
         };
@@ -243,16 +270,24 @@ fn growth(turn: f64, worst_incidence: f64) -> f64 {
 
 /// Whether the gap after point `i` is bridged by a line: several points on one side of it, none
 /// apart from its neighbour, lie on a line on which the first point of the other side lies too.
-fn is_bridged(points: &[ScanPoint], gaps: &[Gap], i: usize, config: &BreakpointConfig) -> bool {
+fn is_bridged(
+    points: &[ScanPoint],
+    gaps: &[(usize, Gap)],
+    i: usize,
+    config: &BreakpointConfig,
+) -> bool {
     let (count, k) = (points.len(), config.confirming_points);
     if k >= count {
         return false;
     }
     let limit = config.confirming_sds * config.confirming_sds;
+    let is_apart = |i: usize| {
+        gaps.binary_search_by_key(&i, |gap| gap.0).is_ok_and(|at| gaps[at].1 == Gap::Apart)
+    };
     // The k points from `first` on, in order; the nearer of their ends; and the point across.
     let agrees = |first: usize, near: usize, across: usize| {
         let at = |offset: usize| (first + offset) % count;
-        if (0..k - 1).any(|offset| gaps[at(offset)] == Gap::Apart) {
+        if (0..k - 1).any(|offset| is_apart(at(offset))) {
             return false;
         }
         let far = if near == first { at(k - 1) } else { first };
@@ -315,11 +350,22 @@ mod tests {
         runs_in(points_of(ranges), ring)
     }
 
-    fn runs_in(mut points: Vec<ScanPoint>, ring: Ring) -> (Vec<ScanPoint>, Vec<Range<usize>>) {
+    fn runs_in(points: Vec<ScanPoint>, ring: Ring) -> (Vec<ScanPoint>, Vec<Range<usize>>) {
+        runs_with(points, ring, 1f64.to_radians())
+    }
+
+    fn runs_with(
+        points: Vec<ScanPoint>,
+        ring: Ring,
+        increment: f64,
+    ) -> (Vec<ScanPoint>, Vec<Range<usize>>) {
         let (mut gaps, mut runs) = (Vec::new(), Vec::new());
+        let mut cloud = Cloud::default();
+        cloud.points.extend(points);
+        cloud.index(false);
         let config = BreakpointConfig::default();
-        find_runs(&mut points, ring, 1f64.to_radians(), &config, &mut gaps, &mut runs);
-        (points, runs)
+        find_runs(&mut cloud, ring, increment, &config, &mut gaps, &mut runs);
+        (cloud.points, runs)
     }
 
     fn distance(points: &[ScanPoint], i: usize, j: usize) -> f64 {
@@ -354,19 +400,15 @@ mod tests {
     fn a_few_missing_beams_of_a_fine_scanner_break_no_wall() {
         // A quarter of a degree from beam to beam, ten of forty lost, at 2 m: gaps of 9 cm.
         let fine = |lost: usize| {
-            let mut points: Vec<ScanPoint> = (0..400_usize)
+            let points: Vec<ScanPoint> = (0..400_usize)
                 .filter(|beam| beam % 40 >= lost)
                 .map(|beam| {
                     let direction = unit_normal(0.25_f64.to_radians() * beam as f64);
                     ScanPoint::new(beam, 2.0, direction, &NOISE)
                 })
                 .collect();
-            let (mut gaps, mut runs) = (Vec::new(), Vec::new());
             let ring = Ring { closed: false, beams: 400 };
-            let increment = 0.25_f64.to_radians();
-            let config = BreakpointConfig::default();
-            find_runs(&mut points, ring, increment, &config, &mut gaps, &mut runs);
-            runs.len()
+            runs_with(points, ring, 0.25_f64.to_radians()).1.len()
         };
         assert_eq!((fine(3), fine(10), fine(13)), (1, 1, 10));
     }

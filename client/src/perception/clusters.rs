@@ -6,7 +6,9 @@
 
 use std::ops::Range;
 
-use mapfold_map::geometry::{Covariance, Point, convex_hull_into, distance_to_hull};
+use mapfold_map::geometry::{
+    Covariance, Point, convex_hull_into, convex_hull_of_sweep, distance_to_hull,
+};
 use nalgebra::Matrix2;
 
 use super::points::ScanPoint;
@@ -176,13 +178,24 @@ impl Gatherer {
         }
         self.corners.clear();
         self.corners.extend(points[range.clone()].iter().map(|p| p.at));
-        let hull = self.hull_of_corners(config, several)?;
+        let [first, last] = [&points[range.start], &points[range.end - 1]];
+        if range.len() > 2 && first.direction.perp(&last.direction) > 0.0 {
+            convex_hull_of_sweep(&self.corners, &mut self.hull);
+        } else {
+            convex_hull_into(&mut self.corners, &mut self.hull);
+        }
+        let hull = self.kept_hull(config, several)?;
         Some(FoundCluster { hull, min, max, count: range.len(), sum, variances, shared })
     }
 
     /// The hull of the points in `corners`, unless it must be small and is not.
     fn hull_of_corners(&mut self, config: &ClusterConfig, small: bool) -> Option<Vec<Point>> {
         convex_hull_into(&mut self.corners, &mut self.hull);
+        self.kept_hull(config, small)
+    }
+
+    /// A copy of the last hull, unless it must be small and is not.
+    fn kept_hull(&mut self, config: &ClusterConfig, small: bool) -> Option<Vec<Point>> {
         if small && !is_small(&self.hull, config) {
             return None;
         }

@@ -88,11 +88,10 @@ pub(super) struct View<'a> {
 }
 
 impl View<'_> {
-    /// The ends of line `i`; `None` if its corners leave too little of it.
-    pub(super) fn ends(&self, lines: &[FoundLine], i: usize) -> Option<Ended> {
+    /// The ends of line `i`, which lies in run `run`; `None` if its corners leave too little of it.
+    pub(super) fn ends(&self, lines: &[FoundLine], i: usize, run: usize) -> Option<Ended> {
         let line = &lines[i];
-        let after = self.runs.partition_point(|run| run.end <= line.first());
-        let run = self.runs.get(after)?;
+        let run = &self.runs[run];
         // A room seen all round in one run has no first wall: its last one comes before it.
         let endless = self.ring.closed && self.runs.len() == 1 && lines.len() > 1;
         let neighbour = |at: Option<usize>, round: usize| {

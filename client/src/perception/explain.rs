@@ -6,44 +6,40 @@ use mapfold_map::geometry::chi_square_quantile;
 
 use super::cloud::Cloud;
 use super::guess::Guess;
-use super::points::ScanPoint;
+use super::tally::{Frame, Held, Tally};
 
 /// The guess, or a better one of the same points, that explains them: those of a stretch but for its
-/// strays.
+/// strays, of which there are so many; and if there are none, what was summed about it. It lies within so many
+/// deviations of each of them, and within what chance allows of all together.
 pub(super) fn explaining(
     cloud: &Cloud,
     stretch: &Range<usize>,
-    stray: &[bool],
+    (stray, strays): (&[bool], usize),
     guess: &Guess,
     sds: f64,
     z: f64,
-) -> Option<Guess> {
-    let own = || cloud.without(stretch, stray);
-    if explains(own(), guess, sds, z) {
-        return Some(*guess);
+) -> Option<(Guess, Option<Held>)> {
+    let most = chi_square_quantile((stretch.len() - strays).saturating_sub(2), z);
+    // No line is nearer to its points, by the weights that they have at most.
+    if guess.off() > most * cloud.turned_max() {
+        return None;
     }
-    let refined = guess.refined(own())?;
-    explains(own(), &refined, sds, z).then_some(refined)
-}
-
-/// Whether a line lies within so many deviations of each of its points, and within what chance
-/// allows of all together.
-fn explains<'a>(
-    points: impl Iterator<Item = &'a ScanPoint>,
-    guess: &Guess,
-    sds: f64,
-    z: f64,
-) -> bool {
-    let limit = sds * sds;
-    let (mut chi_sq, mut count) = (0.0, 0_usize);
-    for point in points {
-        let squared = guess.normalised_sq(point);
-        if squared > limit {
-            return false;
-        }
-        // NaN goes on into the sum, which then passes no test.
-        chi_sq += squared;
-        count += 1;
+    // NaN passes no test.
+    let explains = |tally: &Tally| tally.worst <= sds * sds && tally.ee <= most;
+    let tally = |frame: &Frame| match strays {
+        0 => frame.tally_of(&cloud.columns, stretch),
+        _ => frame.tally(cloud.without(stretch, stray)),
+    };
+    let held = |frame: Frame, tally: Tally| {
+        (strays == 0).then(|| Held { frame, points: stretch.clone(), tally })
+    };
+    let frame = guess.frame();
+    let first = tally(&frame);
+    if explains(&first) {
+        return Some((*guess, held(frame, first)));
     }
-    chi_sq <= chi_square_quantile(count.saturating_sub(2), z)
+    let refined = guess.refined(&first)?;
+    let frame = refined.frame();
+    let second = tally(&frame);
+    explains(&second).then(|| (refined, held(frame, second)))
 }

@@ -19,9 +19,10 @@
 use mapfold_map::geometry::{Covariance, Point, Sensor, UncertainLine};
 use nalgebra::Matrix2;
 
-use super::guess::{Guess, Sums};
+use super::guess::Sums;
 use super::hedge::Doubt;
 use super::points::ScanPoint;
+use super::tally::{Frame, Tally};
 use crate::sensor::ScannerProfile;
 
 /// How a line is fitted.
@@ -118,28 +119,32 @@ impl LineFit {
         self.span.1 - self.span.0
     }
 
-    /// Weight of a point, where its beam meets the line, from the middle of the line, and how far off
-    /// it ended.
-    pub(super) fn local(&self, point: &ScanPoint) -> (f64, f64, f64) {
-        let d = point.at - self.tangent * self.middle;
-        let e = self.normal.dot(&d) - self.line.line.rho();
-        let (w, slip) = weight_and_slip(point, &self.normal, &self.tangent);
-        (w, self.tangent.dot(&d) - e * slip, e)
+    /// A point as the line sees it.
+    #[inline]
+    pub(super) fn local(&self, point: &ScanPoint) -> Local {
+        let (n, u) = (&self.normal, &self.tangent);
+        let off = n.dot(&point.at) - self.line.line.rho();
+        let (towards, beside) = (point.direction.dot(n), point.direction.dot(u));
+        let (along, across) = (point.variance_along, point.variance_across);
+        let weight = 1.0 / (along * towards * towards + across * beside * beside);
+        let slip = (along - across) * towards * beside * weight;
+        let place = u.dot(&point.at) - self.middle - off * slip;
+        Local { weight, place, off, towards }
     }
 
     /// How many of these points, the outermost of one end in their order inwards, stand together
     /// off the line: the largest number whose summed residuals are more than `sds` deviations from
     /// nothing. Each alone may lie well within its own noise. The sum of `m` weighted residuals has the
     /// variance `W_m - W_m^2 / W - T_m^2 / S_tt`, for the line has followed them as far as it could.
-    pub(super) fn astray<'a>(&self, end: impl Iterator<Item = &'a ScanPoint>, sds: f64) -> usize {
+    pub(super) fn astray(&self, end: &[Local], sds: f64) -> usize {
+        let [per_weight, per_along] = [1.0 / self.weight, 1.0 / self.along];
         let (mut weight, mut along, mut sum) = (0.0, 0.0, 0.0);
         let (mut worst, mut astray) = (sds * sds, 0);
-        for (i, point) in end.enumerate() {
-            let (w, t, e) = self.local(point);
-            weight += w;
-            along += w * t;
-            sum += w * e;
-            let variance = weight - weight * weight / self.weight - along * along / self.along;
+        for (i, point) in end.iter().enumerate() {
+            weight += point.weight;
+            along += point.weight * point.place;
+            sum += point.weight * point.off;
+            let variance = weight - weight * weight * per_weight - along * along * per_along;
             if sum * sum > worst * variance && variance > 0.0 {
                 worst = sum * sum / variance;
                 astray = i + 1;
@@ -154,7 +159,7 @@ impl LineFit {
     pub(super) fn bow<'a>(&self, points: impl Iterator<Item = &'a ScanPoint>) -> (f64, f64) {
         let (mut ttt, mut tttt, mut tte) = (0.0, 0.0, 0.0);
         for point in points {
-            let (w, t, e) = self.local(point);
+            let Local { weight: w, place: t, off: e, .. } = self.local(point);
             let tt = t * t;
             ttt += w * tt * t;
             tttt += w * tt * tt;
@@ -184,30 +189,38 @@ pub fn fit_line<'a, I>(points: I, config: &FitConfig) -> Result<LineFit, FitErro
 where
     I: Iterator<Item = &'a ScanPoint> + Clone,
 {
-    let own = points.clone();
-    let reference = points.clone().next().ok_or(FitError::TooFew)?.at;
-    let sums = points.fold(Sums::default(), |sums, point| {
-        sums.with(&(point.at - reference), 1.0 / point.variance_along)
+    let first = points.clone().next().ok_or(FitError::TooFew)?.at;
+    let last = points.clone().last().map_or(first, |point| point.at);
+    let sums = points.clone().fold(Sums::default(), |sums, point| {
+        sums.with(&(point.at - first), 1.0 / point.variance_along)
     });
     let mut guess = sums.guess();
-    guess.centre += reference;
-    fit_from(&own, &guess, config)
+    guess.centre += first;
+    let again = |frame: &Frame| frame.tally(points.clone());
+    let frame = guess.frame();
+    let shared = points.clone().map(|point| point.variance_shared).sum();
+    let fitted = fit_from((frame, again(&frame)), [&first, &last], shared, again, config);
+    fitted.map(|(fit, ..)| fit)
 }
 
-/// Fits a line to points of which a first guess of its direction is known.
+/// Fits a line to points that have been summed about a frame: their first and last, the sum of the variances
+/// that neighbours share, and a way to sum them about another. The frame in which the line was found goes with
+/// it.
 ///
 /// # Errors
 /// As for [`fit_line`].
-pub(super) fn fit_from<'a, I>(
-    points: &I,
-    guess: &Guess,
+pub(super) fn fit_from(
+    (mut frame, mut tally): (Frame, Tally),
+    ends: [&Point; 2],
+    shared: f64,
+    again: impl Fn(&Frame) -> Tally,
     config: &FitConfig,
-) -> Result<LineFit, FitError>
-where
-    I: Iterator<Item = &'a ScanPoint> + Clone,
-{
-    let mut frame = Frame { normal: guess.normal, tangent: guess.tangent, centre: guess.centre };
-    let mut moments = frame.moments(points.clone())?;
+) -> Result<(LineFit, Frame, Tally), FitError> {
+    let count = tally.count;
+    if count < 3 {
+        return Err(FitError::TooFew);
+    }
+    let mut moments = tally.moments();
     for _ in 0..STEPS_MAX {
         let slope = moments.slope();
         // NaN is no small slope.
@@ -215,12 +228,13 @@ where
             break;
         }
         frame = frame.turned(slope, &moments);
-        moments = frame.moments(points.clone())?;
+        tally = again(&frame);
+        moments = tally.moments();
     }
     let slope = moments.slope();
     let along = moments.tt;
     // As wide as their noise makes them, points may still be a line. Written so that NaN fails too.
-    let width = (moments.ee - moments.count as f64).max(0.0);
+    let width = (moments.ee - count as f64).max(0.0);
     if !(along > 0.0 && along - width >= config.linearity_min * (along + width)) {
         return Err(FitError::NotLinear);
     }
@@ -230,30 +244,22 @@ where
     }
     let tangent = Point::new(-normal.y, normal.x);
     let (rho, tc) = (normal.dot(&centre), tangent.dot(&centre));
-    let (a, b) = (tangent.dot(&moments.first), tangent.dot(&moments.last));
+    let [a, b] = ends.map(|end| tangent.dot(end));
     let span = (a.min(b), a.max(b));
 
     let half_length = 0.5 * (span.1 - span.0);
     // The variance of a mean of errors that are all alike is at most the mean of their variances.
-    let floor = config.systematic_sd * config.systematic_sd + moments.shared / moments.count as f64;
+    let floor = config.systematic_sd * config.systematic_sd + shared / count as f64;
     let chi_sq = (moments.ee - slope * moments.te).max(0.0);
     // Points that scatter more than their sensor should know the line no better than they do.
-    let scatter = (chi_sq / (moments.count - 2) as f64).max(1.0);
+    let scatter = (chi_sq / (count - 2) as f64).max(1.0);
     let tilt = scatter / along + floor / (3.0 * half_length * half_length);
     let shift = scatter / moments.weight + floor;
     // Points without extent give no finite matrix.
     let line = line_about([shift, 0.0, tilt], rho, &normal, tc).ok_or(FitError::NotLinear)?;
-    Ok(LineFit {
-        line,
-        normal,
-        tangent,
-        count: moments.count,
-        chi_sq,
-        span,
-        weight: moments.weight,
-        along,
-        middle: tc,
-    })
+    let weight = moments.weight;
+    let fit = LineFit { line, normal, tangent, count, chi_sq, span, weight, along, middle: tc };
+    Ok((fit, frame, tally))
 }
 
 /// A line whose variance of the offset at `middle` along it, covariance with its angle and variance of that
@@ -275,103 +281,18 @@ fn line_about(
 const STEPS_MAX: usize = 3;
 const SLOPE_SETTLED: f64 = 0.02;
 
-/// The weight of a point, `1 / (n^T C n)`, and how far its error moves it along a line as it moves it
-/// off it, `u^T C n / (n^T C n)`. Where its beam meets the line, and not the foot of its end there, is
-/// its place: errors lie along the beam, and what they do along the wall is not the wall's doing.
-fn weight_and_slip(point: &ScanPoint, n: &Point, u: &Point) -> (f64, f64) {
-    let (towards, beside) = (point.direction.dot(n), point.direction.dot(u));
-    let (along, across) = (point.variance_along, point.variance_across);
-    let weight = 1.0 / (along * towards * towards + across * beside * beside);
-    (weight, (along - across) * towards * beside * weight)
-}
-
-/// A line that is nearly the one sought.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Frame {
-    pub(super) normal: Point,
-    pub(super) tangent: Point,
-    pub(super) centre: Point,
-}
-
-/// Weighted central moments in a frame: t along it, e across it.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Moments {
+/// A point as a line sees it. Where its beam meets the line, and not the foot of its end there, is its place:
+/// errors lie along the beam, and what they do along the wall is not the wall's doing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Local {
+    /// `1 / (n^T C n)`.
     pub(super) weight: f64,
-    t_mean: f64,
-    e_mean: f64,
-    pub(super) tt: f64,
-    te: f64,
-    pub(super) ee: f64,
-    /// Sum of the variances that neighbours share.
-    shared: f64,
-    count: usize,
-    first: Point,
-    last: Point,
-}
-
-impl Frame {
-    pub(super) fn moments<'a>(
-        &self,
-        points: impl Iterator<Item = &'a ScanPoint>,
-    ) -> Result<Moments, FitError> {
-        let Self { normal: n, tangent: u, centre } = self;
-        let (mut weight, mut t_sum, mut e_sum) = (0.0, 0.0, 0.0);
-        let (mut tt, mut te, mut ee) = (0.0, 0.0, 0.0);
-        let (mut shared, mut count) = (0.0, 0_usize);
-        let (mut first, mut last) = (*centre, *centre);
-        for point in points {
-            let d = point.at - centre;
-            let e = n.dot(&d);
-            let (w, slip) = weight_and_slip(point, n, u);
-            let t = u.dot(&d) - e * slip;
-            let (wt, we) = (w * t, w * e);
-            weight += w;
-            t_sum += wt;
-            e_sum += we;
-            tt += wt * t;
-            te += wt * e;
-            ee += we * e;
-            shared += point.variance_shared;
-            if count == 0 {
-                first = point.at;
-            }
-            last = point.at;
-            count += 1;
-        }
-        if count < 3 {
-            return Err(FitError::TooFew);
-        }
-        let (t_mean, e_mean) = (t_sum / weight, e_sum / weight);
-        Ok(Moments {
-            weight,
-            t_mean,
-            e_mean,
-            tt: tt - t_sum * t_mean,
-            te: te - t_sum * e_mean,
-            ee: ee - e_sum * e_mean,
-            shared,
-            count,
-            first,
-            last,
-        })
-    }
-
-    /// The line that the moments ask for.
-    pub(super) fn turned(&self, slope: f64, moments: &Moments) -> Self {
-        let stretch = 1.0 / (1.0 + slope * slope).sqrt();
-        Self {
-            normal: (self.normal - self.tangent * slope) * stretch,
-            tangent: (self.tangent + self.normal * slope) * stretch,
-            centre: self.centre + self.tangent * moments.t_mean + self.normal * moments.e_mean,
-        }
-    }
-}
-
-impl Moments {
-    /// Regression of e on t.
-    pub(super) fn slope(&self) -> f64 {
-        self.te / self.tt
-    }
+    /// Where its beam meets the line, from the line's middle.
+    pub(super) place: f64,
+    /// How far off the line it ended, away from the sensor.
+    pub(super) off: f64,
+    /// The cosine of its beam on the normal.
+    pub(super) towards: f64,
 }
 
 #[cfg(test)]

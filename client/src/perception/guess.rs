@@ -6,8 +6,8 @@
 
 use mapfold_map::geometry::Point;
 
-use super::fit::Frame;
 use super::points::ScanPoint;
+use super::tally::{Frame, Tally};
 
 /// Sums over points: of their weights, and of their coordinates and products with these weights.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -100,11 +100,20 @@ pub(super) struct Guess {
 }
 
 impl Guess {
-    /// The line of the same points with weights that know its direction, as this guess has it.
-    pub(super) fn refined<'a>(&self, points: impl Iterator<Item = &'a ScanPoint>) -> Option<Self> {
-        let frame = Frame { normal: self.normal, tangent: self.tangent, centre: self.centre };
-        let moments = frame.moments(points).ok()?;
-        let Frame { mut normal, mut tangent, centre } = frame.turned(moments.slope(), &moments);
+    /// The line as a frame for sums.
+    pub(super) fn frame(&self) -> Frame {
+        Frame { normal: self.normal, tangent: self.tangent, centre: self.centre }
+    }
+
+    /// The line of the same points with weights that know its direction, as this guess has it: from
+    /// their sums about it.
+    pub(super) fn refined(&self, tally: &Tally) -> Option<Self> {
+        if tally.count < 3 {
+            return None;
+        }
+        let moments = tally.moments();
+        let Frame { mut normal, mut tangent, centre } =
+            self.frame().turned(moments.slope(), &moments);
         if normal.dot(&centre) < 0.0 {
             (normal, tangent) = (-normal, -tangent);
         }
@@ -122,6 +131,11 @@ impl Guess {
     /// Second moment along the line about the centre.
     pub(super) fn along(&self) -> f64 {
         0.5 * (self.spread + self.lambda)
+    }
+
+    /// Second moment across the line, the least of any line.
+    pub(super) fn off(&self) -> f64 {
+        0.5 * (self.spread - self.lambda)
     }
 
     /// Signed distance of `p` from the line, away from the sensor.

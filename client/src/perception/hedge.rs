@@ -17,8 +17,7 @@
 //! the line moves by `-d g`, and knows `s g g^T / V` less. Precise ranges show every step, or that there is none, and
 //! the hypotheses weigh nothing; the coarser they are, the more of this is honest doubt.
 
-use super::fit::LineFit;
-use super::points::ScanPoint;
+use super::fit::{LineFit, Local};
 
 /// What may stand beside walls.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,17 +47,10 @@ pub(super) struct Doubt {
 }
 
 impl LineFit {
-    /// The line with the doubt about both of its ends in it, of its own `count` points in the order of the
-    /// beams.
-    pub(super) fn hedged<'a>(
-        self,
-        own: impl DoubleEndedIterator<Item = &'a ScanPoint> + Clone,
-        count: usize,
-        config: &HedgeConfig,
-    ) -> Self {
-        let most = (count / 3).min(config.points_max);
-        let first = self.doubt(own.clone().take(most), most, config);
-        let last = self.doubt(own.rev().take(most), most, config);
+    /// The line with the doubt about both of its ends in it, of the outermost points of each in their order
+    /// inwards.
+    pub(super) fn hedged(self, ends: [&[Local]; 2], config: &HedgeConfig) -> Self {
+        let [first, last] = ends.map(|end| self.doubt(end, config));
         let mean = [first.mean[0] + last.mean[0], first.mean[1] + last.mean[1]];
         let mut spread = first.spread;
         for (sum, more) in spread.iter_mut().zip(last.spread) {
@@ -68,12 +60,8 @@ impl LineFit {
     }
 
     /// The doubt that the outermost points of one end, in their order inwards, leave.
-    fn doubt<'a>(
-        &self,
-        end: impl Iterator<Item = &'a ScanPoint>,
-        most: usize,
-        config: &HedgeConfig,
-    ) -> Doubt {
+    fn doubt(&self, end: &[Local], config: &HedgeConfig) -> Doubt {
+        let most = end.len();
         let [per_weight, per_along] = [1.0 / self.weight, 1.0 / self.along];
         // Points that scatter more than their sensor should show a step no better than they do.
         let [per_scatter, step_variance] = [1.0 / self.scatter(), config.step_sd * config.step_sd];
@@ -83,9 +71,8 @@ impl LineFit {
         let mut total = 1.0 - config.foreign_share;
         let (mut mean, mut second) = ([0.0; 2], [0.0; 3]);
         let (mut asked, mut next) = (0, 1);
-        for (i, point) in end.enumerate() {
-            let (w, t, e) = self.local(point);
-            let k = point.direction.dot(&self.normal);
+        for (i, point) in end.iter().enumerate() {
+            let Local { weight: w, place: t, off: e, towards: k } = *point;
             let wk = w * k;
             h[0] += wk;
             h[1] += wk * t;
@@ -138,7 +125,7 @@ impl LineFit {
 mod tests {
     use super::*;
     use crate::perception::fit::{FitConfig, fit_line};
-    use crate::perception::points::NoiseConfig;
+    use crate::perception::points::{NoiseConfig, ScanPoint};
     use mapfold_map::geometry::Point;
 
     const FIT: FitConfig = FitConfig { systematic_sd: 0.0, linearity_min: 0.8 };
@@ -161,7 +148,10 @@ mod tests {
     }
 
     fn hedged(points: &[ScanPoint], fit: LineFit) -> LineFit {
-        fit.hedged(points.iter(), points.len(), &HedgeConfig::STANDARD)
+        let most = HedgeConfig::STANDARD.points_max.min(points.len() / 3);
+        let first: Vec<_> = points.iter().take(most).map(|p| fit.local(p)).collect();
+        let last: Vec<_> = points.iter().rev().take(most).map(|p| fit.local(p)).collect();
+        fit.hedged([&first, &last], &HedgeConfig::STANDARD)
     }
 
     fn sd_of_angle(fit: &LineFit) -> f64 {
@@ -194,7 +184,7 @@ mod tests {
     fn a_point_whose_step_is_sure_and_free_tells_nothing() {
         let (points, fit, _) = wall(0.02, 0.1);
         let config = HedgeConfig { foreign_share: 1.0, step_sd: 1e3, points_max: 1 };
-        let doubt = fit.doubt(points.iter().rev().take(1), 1, &config);
+        let doubt = fit.doubt(&[fit.local(&points[39])], &config);
         let without = fit_line(points[..39].iter(), &FIT).unwrap();
         let hedged = fit.moved(&doubt);
         let (a, b) = (&hedged.line, &without.line);

@@ -90,9 +90,9 @@ pub fn judge_into(
     }));
     let count = states.len();
     let step = config.veil_step;
-    let between = |r0: f64, r: f64, r1: f64| {
-        (r0 - r > step && r - r1 > step) || (r - r0 > step && r1 - r > step)
-    };
+    let jumps = |before: f64, after: f64| (after - before).abs() > step;
+    // Given that it jumps on both sides.
+    let between = |r0: f64, r: f64, r1: f64| (r0 > r && r > r1) || (r0 < r && r < r1);
     let closed = scan.is_full_circle();
     let veils = Veils {
         ranges: &scan.ranges,
@@ -102,15 +102,19 @@ pub fn judge_into(
         slight: config.continuation_angle.tan(),
         range_sd: config.range_sd,
     };
-    for (i, three) in scan.ranges.windows(3).enumerate() {
-        if between(three[0], three[1], three[2]) && veils.holds(states, i + 1) {
-            states[i + 1] = BeamState::Mixed;
+    let mut jumped = false;
+    for (i, two) in scan.ranges.windows(2).enumerate() {
+        let jump = jumps(two[0], two[1]);
+        if jumped & jump && between(scan.ranges[i - 1], two[0], two[1]) && veils.holds(states, i) {
+            states[i] = BeamState::Mixed;
         }
+        jumped = jump;
     }
     if closed {
         for (before, beam, after) in [(count - 2, count - 1, 0), (count - 1, 0, 1)] {
             let ranges = [before, beam, after].map(|beam| scan.ranges[beam]);
-            if between(ranges[0], ranges[1], ranges[2]) && veils.holds(states, beam) {
+            let is_step = jumps(ranges[0], ranges[1]) && jumps(ranges[1], ranges[2]);
+            if is_step && between(ranges[0], ranges[1], ranges[2]) && veils.holds(states, beam) {
                 states[beam] = BeamState::Mixed;
             }
         }

@@ -115,13 +115,16 @@ pub fn points_into(
     noise: &NoiseConfig,
     points: &mut Vec<ScanPoint>,
 ) {
-    points.clear();
+    // Every beam writes its point where the last that hit something left off: whether one does is chance, so it is
+    // no branch.
+    points.resize(scan.ranges.len(), ScanPoint::new(0, 0.0, Point::zeros(), noise));
+    let mut count = 0;
     let beams = states.iter().zip(&scan.ranges).zip(directions).enumerate();
     for (beam, ((state, range), direction)) in beams {
-        if *state == BeamState::Hit {
-            points.push(ScanPoint::new(beam, *range, *direction, noise));
-        }
+        points[count] = ScanPoint::new(beam, *range, *direction, noise);
+        count += usize::from(*state == BeamState::Hit);
     }
+    points.truncate(count);
     if !scan.repeats.is_empty() {
         for point in points {
             point.variance_along *= scan.variance_share(point.beam);

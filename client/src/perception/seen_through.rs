@@ -9,8 +9,8 @@ use std::ops::Range;
 use mapfold_map::geometry::{Interval, Point};
 
 use super::breakpoints::Ring;
+use super::cloud::Cloud;
 use super::fit::LineFit;
-use super::points::ScanPoint;
 use super::split::FoundLine;
 
 /// When a beam went through a line.
@@ -34,36 +34,63 @@ impl Default for SeenThroughConfig {
 }
 
 /// A stretch of points.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Block {
     /// The points.
     pub(super) points: Range<usize>,
     /// Whether they lie on one line, so that all are on this side of another if its ends are.
     pub(super) straight: bool,
+    /// Corners of the box around them, if they are straight around the first and the last.
+    min: Point,
+    max: Point,
+}
+
+impl Block {
+    fn straight(cloud: &Cloud, points: &Range<usize>) -> Self {
+        let [a, b] = [points.start, points.end - 1].map(|i| cloud.columns.at(i));
+        Self { points: points.clone(), straight: true, min: a.inf(&b), max: a.sup(&b) }
+    }
+
+    fn loose(cloud: &Cloud, points: &Range<usize>) -> Self {
+        let [x, y] = [&cloud.columns.x, &cloud.columns.y].map(|c| &c[points.clone()]);
+        let least = |values: &[f64]| values.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let (min, max) = (Point::new(least(x), least(y)), Point::new(most(x), most(y)));
+        Self { points: points.clone(), straight: false, min, max }
+    }
+
+    /// How far its box reaches in a direction.
+    fn reaches(&self, n: &Point) -> f64 {
+        let farther = |n: f64, min: f64, max: f64| if n > 0.0 { n * max } else { n * min };
+        farther(n.x, self.min.x, self.max.x) + farther(n.y, self.min.y, self.max.y)
+    }
 }
 
 /// The stretches of lines and of what no line explains, each ascending, as one sequence.
-pub(super) fn blocks(lines: &[FoundLine], loose: &[Range<usize>], blocks: &mut Vec<Block>) {
+pub(super) fn blocks(
+    cloud: &Cloud,
+    lines: &[FoundLine],
+    loose: &[Range<usize>],
+    blocks: &mut Vec<Block>,
+) {
     blocks.clear();
     let mut loose = loose.iter().peekable();
     for line in lines {
         while let Some(stretch) = loose.next_if(|stretch| stretch.start < line.points.start) {
-            blocks.push(Block { points: stretch.clone(), straight: false });
+            blocks.push(Block::loose(cloud, stretch));
         }
-        blocks.push(Block { points: line.points.clone(), straight: true });
+        blocks.push(Block::straight(cloud, &line.points));
         // Strays among its points.
         while loose.next_if(|stretch| stretch.end <= line.points.end).is_some() {}
     }
-    blocks.extend(loose.map(|stretch| Block { points: stretch.clone(), straight: false }));
+    blocks.extend(loose.map(|stretch| Block::loose(cloud, stretch)));
 }
 
 /// The points of a scan in the order of the beams.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sweep<'a> {
-    /// The points, and where they are.
-    pub(super) points: &'a [ScanPoint],
-    /// See above.
-    pub(super) at: &'a [Point],
+    /// The points.
+    pub(super) cloud: &'a Cloud,
     /// The stretches that the points fall into, ascending.
     pub(super) blocks: &'a [Block],
     /// How the beams follow each other.
@@ -73,20 +100,19 @@ pub(super) struct Sweep<'a> {
 }
 
 /// The stretches of `fit`'s line beyond its ends at `from` and `to` that beams went through, in
-/// millimetres along it from the sensor's foot point, `shift` metres added, ascending. `first` and
-/// `last` are the wall's own outermost points. `found` is empty before.
+/// millimetres along it from the sensor's foot point, `shift` metres added, ascending. `own` is the wall's
+/// own stretch among the blocks. `found` is empty before.
 pub(super) fn stretches(
     sweep: &Sweep<'_>,
     fit: &LineFit,
-    (first, last): (usize, usize),
+    own: usize,
     (from, to): (f64, f64),
     shift: f64,
     config: &SeenThroughConfig,
     found: &mut Vec<Interval>,
 ) {
     let blocks = sweep.blocks;
-    let own = blocks.partition_point(|block| block.points.end <= first);
-    let next = blocks.partition_point(|block| block.points.start <= last);
+    let next = own + 1;
     // Round the end of the points if the scan is closed, but not round to the wall itself.
     let (below, above) =
         if sweep.ring.closed { (next..blocks.len(), 0..own) } else { (0..0, 0..0) };
@@ -127,8 +153,17 @@ impl Walk<'_> {
         let limit = normal * rho + self.fit.tangent * (self.outwards * reach);
         let beyond = Point::new(-limit.y, limit.x) * self.outwards;
         for block in blocks {
-            let Block { points, straight } = &self.sweep.blocks[block];
-            let ends = [self.sweep.at[points.start], self.sweep.at[points.end - 1]];
+            let block = &self.sweep.blocks[block];
+            // Most ends on the line or before it, and within reach.
+            if block.reaches(&normal) <= on_line && block.reaches(&beyond) <= 0.0 {
+                self.close(tell);
+                continue;
+            }
+            let Block { points, straight, .. } = block;
+            let ends = [
+                self.sweep.cloud.columns.at(points.start),
+                self.sweep.cloud.columns.at(points.end - 1),
+            ];
             if *straight && ends.iter().all(|p| normal.dot(p) <= on_line) {
                 self.close(tell);
                 if ends.iter().any(|p| beyond.dot(p) > 0.0) {
@@ -144,8 +179,9 @@ impl Walk<'_> {
             // What is straight and behind the line at both ends is behind it all along.
             if *straight && let (Some(a), Some(b)) = (self.crossing(near), self.crossing(far)) {
                 self.take(a, near, tell);
-                self.open = self.open.map(|(from, _, _)| (from, b.1, self.sweep.points[far].beam));
-                if beyond.dot(&self.sweep.at[far]) > 0.0 {
+                self.open =
+                    self.open.map(|(from, _, _)| (from, b.1, self.sweep.cloud.points[far].beam));
+                if beyond.dot(&self.sweep.cloud.columns.at(far)) > 0.0 {
                     self.close(tell);
                     return;
                 }
@@ -153,7 +189,7 @@ impl Walk<'_> {
             }
             for k in 0..points.len() {
                 let i = if self.outwards > 0.0 { near + k } else { near - k };
-                let at = &self.sweep.at[i];
+                let at = &self.sweep.cloud.columns.at(i);
                 if beyond.dot(at) > 0.0 {
                     self.close(tell);
                     return;
@@ -170,7 +206,7 @@ impl Walk<'_> {
 
     /// Where a beam crossed the line, half a beam's spacing either side, if it did so for sure.
     fn crossing(&self, i: usize) -> Option<(f64, f64)> {
-        let (fit, point) = (self.fit, &self.sweep.points[i]);
+        let (fit, point) = (self.fit, &self.sweep.cloud.points[i]);
         let towards = fit.normal.dot(&point.direction);
         let range_on_line = fit.line.line.rho() / towards;
         let behind = point.range - range_on_line - self.config.depth_min;
@@ -189,7 +225,7 @@ impl Walk<'_> {
 
     /// Takes where a beam crossed the line into the open stretch, or opens one.
     fn take(&mut self, (a, b): (f64, f64), i: usize, tell: &mut impl FnMut(f64, f64)) {
-        let beam = self.sweep.points[i].beam;
+        let beam = self.sweep.cloud.points[i].beam;
         let follows = |before: usize| {
             let apart = beam.abs_diff(before);
             // One lost reading between two that went through does not part them.

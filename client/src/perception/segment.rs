@@ -32,10 +32,11 @@ impl Mount {
     }
 }
 
-/// A line with its ends as the robot hands it in. `seen_through` is an empty buffer to fill.
+/// A line with its ends as the robot hands it in, with its place among the sweep's blocks and the number of its
+/// points. `seen_through` is an empty buffer to fill.
 pub(super) fn in_robot_frame(
     line: &FoundLine,
-    count: usize,
+    (own, count): (usize, usize),
     ended: &Ended,
     mount: &Mount,
     sweep: &Sweep<'_>,
@@ -52,9 +53,8 @@ pub(super) fn in_robot_frame(
     let (uncertain, turned) = UncertainLine::<Robot>::normal_form(rho, alpha, covariance);
     let (from, to) = (ended.from + shift, ended.to + shift);
     let [lower, upper] = ended.ends;
-    let outermost = (line.first(), line.last());
     let span = (ended.from, ended.to);
-    seen_through::stretches(sweep, fit, outermost, span, shift, config, &mut seen_through);
+    seen_through::stretches(sweep, fit, own, span, shift, config, &mut seen_through);
     if turned {
         seen_through.reverse();
         for stretch in &mut seen_through {

@@ -5,46 +5,51 @@ use std::ops::Range;
 
 use super::Config;
 use super::cloud::Cloud;
-use super::fit::{LineFit, fit_from};
-use super::guess::Guess;
+use super::fit::{LineFit, Local, fit_from};
 use super::points::ScanPoint;
 use super::split::{FoundLine, Piece, SplitConfig, Splitter, guess_without};
+use super::tally::{Frame, Held};
 
 /// Most fits of one line, each with fewer points than the one before.
 const TRIMS_MAX: usize = 4;
 
 impl Splitter {
-    /// The line of a piece, if it is one.
+    /// The line of a piece, if it is one; `ends` is room to work in.
     pub(super) fn settled(
         &self,
         cloud: &Cloud,
         piece: &Piece,
-        clear: Range<usize>,
+        mut clear: Range<usize>,
         fewest: usize,
         config: &Config,
+        ends: &mut [Vec<Local>; 2],
     ) -> Option<FoundLine> {
         let split = &config.split;
-        let mut points = piece.points.clone();
-        // What is fitted: the points that are clear of the seams.
-        let mut clear = clear;
-        let mut guess = if clear == points {
-            piece.guess
-        } else {
-            guess_without(cloud, &clear, &self.stray, piece.strays)
+        let (mut points, strays) = (piece.points.clone(), piece.strays);
+        // What is fitted: the points that are clear of the seams. Of a piece that has changed little since it
+        // was proposed, the sums are nearly there.
+        let mut held = match &piece.held {
+            Some(held) if strays == 0 => held.over(cloud, &clear),
+            _ => self.summed(cloud, &clear, strays),
         };
         for trims_left in (0..TRIMS_MAX).rev() {
-            if points.len() < fewest + piece.strays || clear.len() < 3 + piece.strays {
+            if points.len() < fewest + strays || clear.len() < 3 + strays {
                 return None;
             }
-            let fit = self.fitted(cloud, &clear, piece.strays, &guess, config)?;
+            let fit = self.fitted(cloud, &mut held, strays, config)?;
             // Up to a third of the points at either end may be another surface's.
-            let looked_at = (clear.len() / 3).min(split.astray_points_max);
+            let third = clear.len() / 3;
+            let looked_at = third.min(split.astray_points_max);
+            let hedged = third.min(config.hedge.points_max);
             let own = || cloud.points[clear.clone()].iter();
-            let first = fit.astray(own().take(looked_at), split.astray_sds);
-            let last = fit.astray(own().rev().take(looked_at), split.astray_sds);
+            let at_end = looked_at.max(hedged);
+            list(&mut ends[0], &fit, own().take(at_end));
+            list(&mut ends[1], &fit, own().rev().take(at_end));
+            let first = fit.astray(&ends[0][..looked_at], split.astray_sds);
+            let last = fit.astray(&ends[1][..looked_at], split.astray_sds);
             if (first == 0 && last == 0) || trims_left == 0 {
-                let (from, to) = (&cloud.at[points.start], &cloud.at[points.end - 1]);
-                let spanning = fit.spanning(from, to);
+                let (from, to) = (cloud.columns.at(points.start), cloud.columns.at(points.end - 1));
+                let spanning = fit.spanning(&from, &to);
                 let good = spanning.length() >= split.length_min
                     && fit.rms() <= split.rms_max
                     && is_direction_known(&fit, &cloud.points[clear.clone()], split)
@@ -52,9 +57,16 @@ impl Splitter {
                 if !good {
                     return None;
                 }
-                let count = clear.len() - piece.strays;
-                let fit = fit.hedged(cloud.without(&clear, &self.stray), count, &config.hedge);
-                return Some(FoundLine { fit: fit.spanning(from, to), points });
+                let mut hedged = hedged;
+                if strays > 0 {
+                    hedged = ((clear.len() - strays) / 3).min(config.hedge.points_max);
+                    let own = || cloud.without(&clear, &self.stray);
+                    list(&mut ends[0], &fit, own().take(hedged));
+                    list(&mut ends[1], &fit, own().rev().take(hedged));
+                }
+                let fit = fit.hedged(ends.each_ref().map(|end| &end[..hedged]), &config.hedge);
+                let fit = fit.spanning(&from, &to);
+                return Some(FoundLine { fit, points, has_strays: strays > 0 });
             }
             clear = clear.start + first..clear.end - last;
             // What lies beyond what strays from the line does not return to it.
@@ -64,24 +76,51 @@ impl Splitter {
             if last > 0 {
                 points.end = clear.end;
             }
-            guess = guess_without(cloud, &clear, &self.stray, piece.strays);
+            held = match strays {
+                0 => held.over(cloud, &clear),
+                _ => self.summed(cloud, &clear, strays),
+            };
         }
         None
     }
 
+    /// A stretch, but for its strays, about what a guess makes of it.
+    fn summed(&self, cloud: &Cloud, range: &Range<usize>, strays: usize) -> Held {
+        let frame = guess_without(cloud, range, &self.stray, strays).frame();
+        if strays == 0 {
+            return Held::of(cloud, frame, range);
+        }
+        let tally = frame.tally(cloud.without(range, &self.stray));
+        Held { frame, points: range.clone(), tally }
+    }
+
+    /// The line of what is held, which is held about that line from then on.
     fn fitted(
         &self,
         cloud: &Cloud,
-        range: &Range<usize>,
+        held: &mut Held,
         strays: usize,
-        guess: &Guess,
         config: &Config,
     ) -> Option<LineFit> {
-        if strays == 0 {
-            return fit_from(&cloud.points[range.clone()].iter(), guess, &config.fit).ok();
-        }
-        fit_from(&cloud.without(range, &self.stray), guess, &config.fit).ok()
+        let Held { frame, points, tally } = held;
+        let ends = [cloud.columns.at(points.start), cloud.columns.at(points.end - 1)];
+        let again = |frame: &Frame| match strays {
+            0 => frame.tally_of(&cloud.columns, points),
+            _ => frame.tally(cloud.without(points, &self.stray)),
+        };
+        let shared = cloud.shared(points);
+        let summed = (*frame, *tally);
+        let found = fit_from(summed, ends.each_ref(), shared, again, &config.fit).ok()?;
+        let fit;
+        (fit, *frame, *tally) = found;
+        Some(fit)
     }
+}
+
+/// Lists points as a line sees them.
+fn list<'a>(into: &mut Vec<Local>, fit: &LineFit, points: impl Iterator<Item = &'a ScanPoint>) {
+    into.clear();
+    into.extend(points.map(|point| fit.local(point)));
 }
 
 /// Whether the direction of a line is known: its deviation as fitted, and over all slopes across the beams that
@@ -157,7 +196,7 @@ pub(super) fn clear_of_seams(
         // Along the own tangent from the own foot point.
         (sine.abs() > 0.2).then(|| (b.rho - a.rho * a.normal.dot(&b.normal)) / sine)
     };
-    let along = |at: usize| piece.guess.tangent.dot(&cloud.at[at]);
+    let along = |at: usize| piece.guess.tangent.dot(&cloud.columns.at(at));
     let margin = |at: usize| split.seam_sds * cloud.points[at].variance_along.sqrt();
     let before = before.filter(|b| b.points.end + split.stray_points >= start);
     if let Some(t) = before.and_then(meet) {

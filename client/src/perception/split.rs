@@ -18,9 +18,10 @@ use mapfold_map::geometry::Point;
 use super::Config;
 use super::cloud::Cloud;
 use super::explain::explaining;
-use super::fit::LineFit;
+use super::fit::{LineFit, Local};
 use super::guess::Guess;
 use super::settle::clear_of_seams;
+use super::tally::Held;
 
 /// When a run of points is a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -126,6 +127,8 @@ pub struct FoundLine {
     pub points: Range<usize>,
     /// The line.
     pub fit: LineFit,
+    /// Whether strays are marked among its points.
+    pub(super) has_strays: bool,
 }
 
 impl FoundLine {
@@ -147,6 +150,8 @@ pub(super) struct Piece {
     /// Points among them that do not lie on it.
     pub(super) strays: usize,
     pub(super) guess: Guess,
+    /// What was summed when it was proposed.
+    pub(super) held: Option<Held>,
 }
 
 /// Buffers that are used from run to run.
@@ -154,6 +159,8 @@ pub(super) struct Piece {
 pub(super) struct Splitter {
     waiting: Vec<Range<usize>>,
     pieces: Vec<Piece>,
+    /// The points at the ends of a line.
+    pub(super) ends: [Vec<Local>; 2],
     /// For every point of the scan, whether it lies among a line's points and not on it.
     pub(super) stray: Vec<bool>,
 }
@@ -190,11 +197,20 @@ impl Splitter {
             }
         }
         let mut free_from = run.start;
+        let mut ends = std::mem::take(&mut self.ends);
         for (i, piece) in self.pieces.iter().enumerate() {
             let before = i.checked_sub(1).map(|i| &self.pieces[i]);
             let clear = clear_of_seams(cloud, piece, [before, self.pieces.get(i + 1)], config);
-            let line = self.settled(cloud, piece, clear, fewest, config);
+            let line = self.settled(cloud, piece, clear, fewest, config, &mut ends);
             let Some(line) = line else { continue };
+            if !line.has_strays {
+                if line.points.start > free_from {
+                    loose.push(free_from..line.points.start);
+                }
+                free_from = line.points.end;
+                lines.push(line);
+                continue;
+            }
             for at in line.points.clone() {
                 if self.stray[at] {
                     continue;
@@ -206,6 +222,7 @@ impl Splitter {
             }
             lines.push(line);
         }
+        self.ends = ends;
         if free_from < run.end {
             loose.push(free_from..run.end);
         }
@@ -224,8 +241,9 @@ impl Splitter {
             if !hopeless {
                 let guess = cloud.guess(&range);
                 let (sds, z) = (config.split.residual_sds, config.split.chi_sq_z);
-                if let Some(guess) = explaining(cloud, &range, &self.stray, &guess, sds, z) {
-                    self.pieces.push(Piece { points: range, strays: 0, guess });
+                let strays = (&self.stray[..], 0);
+                if let Some((guess, held)) = explaining(cloud, &range, strays, &guess, sds, z) {
+                    self.pieces.push(Piece { points: range, strays: 0, guess, held });
                     continue;
                 }
             }
@@ -303,10 +321,12 @@ impl Splitter {
         let mut points = a.points.start..b.points.end;
         let mut guess = guess_without(cloud, &points, &self.stray, strays);
         let holding = |points: &Range<usize>, guess: &Guess| {
-            explaining(cloud, points, &self.stray, guess, split.merge_sds, split.merge_chi_sq_z)
+            let (sds, z) = (split.merge_sds, split.merge_chi_sq_z);
+            explaining(cloud, points, (&self.stray, strays), guess, sds, z)
         };
+        let held;
         if let Some(better) = holding(&points, &guess) {
-            guess = better;
+            (guess, held) = better;
         } else {
             let off = |at: usize| guess.normalised_sq(&cloud.points[at]);
             if off(points.start) >= off(points.end - 1) {
@@ -319,7 +339,7 @@ impl Splitter {
                 self.stray[between].fill(false);
                 return None;
             };
-            guess = better;
+            (guess, held) = better;
         }
         let mut strays = strays;
         for at in between {
@@ -328,7 +348,7 @@ impl Splitter {
             strays -= usize::from(on);
         }
         let guess = guess_without(cloud, &points, &self.stray, strays);
-        Some(Piece { points, strays, guess })
+        Some(Piece { points, strays, guess, held })
     }
 
     /// Points at the seam of two lines go to the closer one.
@@ -378,6 +398,8 @@ impl Splitter {
             let from = before.map_or(0, |b| points.clone().take_while(|at| near(b, at)).count());
             let to = after.map_or(0, |a| points.clone().rev().take_while(|at| near(a, at)).count());
             if points.len() < from + to + fewest {
+                // Nothing is a stray of no line.
+                self.stray[points.clone()].fill(false);
                 self.pieces.remove(i);
             } else {
                 i += 1;
@@ -395,38 +417,43 @@ fn neighbours(pieces: &mut [Piece], i: usize) -> [&mut Piece; 2] {
 /// The inner point farthest from the chord, and how far in its own deviations, squared; of a run
 /// that ends where it began, the one farthest from there.
 fn farthest_from_chord(cloud: &Cloud, run: &Range<usize>) -> (usize, f64) {
-    let (a, b) = (cloud.at[run.start], cloud.at[run.end - 1]);
+    let (a, b) = (cloud.columns.at(run.start), cloud.columns.at(run.end - 1));
     let chord = b - a;
     let length_sq = chord.norm_squared();
-    let inner = &cloud.at[run.start + 1..run.end - 1];
+    let inner = run.start + 1..run.end - 1;
+    let [x, y] = [&cloud.columns.x, &cloud.columns.y].map(|column| &column[inner.clone()]);
     let (mut best, mut farthest) = (run.len() / 2 - 1, 0.0);
     // A chord shorter than a hand has no direction worth the name.
     if length_sq > 0.01 {
         let n = Point::new(-chord.y, chord.x) / length_sq.sqrt();
         let from = n.dot(&a);
-        let off = |p: &Point| (n.dot(p) - from).abs();
-        // Four at a time: that a new farthest is among them is rare, and no step waits for the last.
-        let (fours, rest) = inner.as_chunks::<4>();
-        for (i, four) in fours.iter().enumerate() {
-            let offs = [off(&four[0]), off(&four[1]), off(&four[2]), off(&four[3])];
-            if offs[0].max(offs[1]).max(offs[2].max(offs[3])) > farthest {
-                for (k, off) in offs.into_iter().enumerate() {
-                    if off > farthest {
-                        (best, farthest) = (4 * i + k, off);
-                    }
-                }
+        let off = |x: f64, y: f64| (n.x * x + n.y * y - from).abs();
+        // So many at a time: that a new farthest is among them is rare, and which it is, is asked once.
+        const TOGETHER: usize = 8;
+        let ((xs, x_rest), (ys, y_rest)) = (x.as_chunks::<TOGETHER>(), y.as_chunks::<TOGETHER>());
+        let mut among = None;
+        for (i, (x, y)) in xs.iter().zip(ys).enumerate() {
+            let offs: [f64; TOGETHER] = std::array::from_fn(|k| off(x[k], y[k]));
+            let four: [f64; 4] = std::array::from_fn(|k| larger(offs[k], offs[k + 4]));
+            let largest = larger(larger(four[0], four[2]), larger(four[1], four[3]));
+            if largest > farthest {
+                (among, farthest) = (Some(i), largest);
             }
         }
-        for (i, p) in rest.iter().enumerate() {
-            if off(p) > farthest {
-                (best, farthest) = (4 * fours.len() + i, off(p));
+        if let Some(i) = among {
+            let is_it = |k: &usize| off(xs[i][*k], ys[i][*k]) >= farthest;
+            best = TOGETHER * i + (0..TOGETHER).find(is_it).unwrap_or(0);
+        }
+        for (i, (x, y)) in x_rest.iter().zip(y_rest).enumerate() {
+            if off(*x, *y) > farthest {
+                (best, farthest) = (TOGETHER * xs.len() + i, off(*x, *y));
             }
         }
         let at = run.start + 1 + best;
         (at, farthest * farthest / cloud.points[at].variance(&n))
     } else {
-        for (i, p) in inner.iter().enumerate() {
-            let off_sq = (p - a).norm_squared();
+        for (i, (x, y)) in x.iter().zip(y).enumerate() {
+            let off_sq = (Point::new(*x, *y) - a).norm_squared();
             if off_sq > farthest {
                 (best, farthest) = (i, off_sq);
             }
@@ -435,6 +462,11 @@ fn farthest_from_chord(cloud: &Cloud, run: &Range<usize>) -> (usize, f64) {
         let point = &cloud.points[at];
         (at, farthest / (point.variance_along + point.variance_across))
     }
+}
+
+#[inline]
+fn larger(a: f64, b: f64) -> f64 {
+    if b > a { b } else { a }
 }
 
 /// The guess of a stretch but for its strays.
@@ -456,7 +488,7 @@ pub(super) fn guess_without(
 /// The gate of two lines, compared about a point between them.
 fn may_be_one(a: &Piece, b: &Piece, cloud: &Cloud, config: &Config) -> bool {
     let split = &config.split;
-    let anchor = (cloud.at[a.points.end - 1] + cloud.at[b.points.start]) * 0.5;
+    let anchor = (cloud.columns.at(a.points.end - 1) + cloud.columns.at(b.points.start)) * 0.5;
     let (offset_sd, turn_sd) = split.model_sd;
     // Covariance of (offset at the anchor, turn), both lines and what walls are.
     let (mut rr, mut ra, mut aa) = (offset_sd * offset_sd, 0.0, turn_sd * turn_sd);
@@ -475,7 +507,7 @@ fn may_be_one(a: &Piece, b: &Piece, cloud: &Cloud, config: &Config) -> bool {
             .sum::<f64>()
             / 3.0;
         let floor = config.fit.systematic_sd * config.fit.systematic_sd;
-        let half = 0.5 * (cloud.at[ends[2]] - cloud.at[ends[0]]).norm();
+        let half = 0.5 * (cloud.columns.at(ends[2]) - cloud.columns.at(ends[0])).norm();
         let tilt = across / guess.along() + floor / (3.0 * half * half);
         let arm = guess.tangent.dot(&(guess.centre - anchor));
         rr += across / guess.weight + floor + arm * arm * tilt;

@@ -28,6 +28,23 @@ pub fn convex_hull_into(points: &mut Vec<Point>, hull: &mut Vec<Point>) {
     half_hull(points.iter().rev(), hull);
 }
 
+/// The convex hull of points that lie counter-clockwise about the origin in their order, less than half a turn from the
+/// first to the last, in place of what `hull` holds: as [`convex_hull`], without a sort.
+pub fn convex_hull_of_sweep(points: &[Point], hull: &mut Vec<Point>) {
+    hull.clear();
+    // Seen from the origin, one chain is the far side and one the near side.
+    half_hull(points.iter(), hull);
+    half_hull(points.iter().rev(), hull);
+    hull.dedup();
+    for p in hull.iter_mut() {
+        *p = p.add_scalar(0.0);
+    }
+    let order = |a: &Point, b: &Point| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y));
+    if let Some(first) = (0..hull.len()).min_by(|a, b| order(&hull[*a], &hull[*b])) {
+        hull.rotate_left(first);
+    }
+}
+
 /// One half of the hull: the turns to the left, without the last point.
 fn half_hull<'a>(points: impl Iterator<Item = &'a Point>, hull: &mut Vec<Point>) {
     let start = hull.len();
@@ -60,4 +77,24 @@ pub fn distance_to_hull(p: &Point, hull: &[Point]) -> f64 {
         inside &= edge.perp(&(p - a)) >= 0.0;
     }
     if inside { 0.0 } else { nearest }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::unit_normal;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_sweep_needs_no_sort(
+            ranges in prop::collection::vec(0.2..3.0, 1..40), first in -4.0..4.0, turn in 0.001..0.07,
+        ) {
+            let points: Vec<Point> =
+                ranges.iter().enumerate().map(|(i, r)| unit_normal(first + turn * i as f64) * *r).collect();
+            let mut hull = Vec::new();
+            convex_hull_of_sweep(&points, &mut hull);
+            prop_assert_eq!(hull, convex_hull(&points));
+        }
+    }
 }
