@@ -140,6 +140,11 @@ impl Gatherer {
         let left = self.found.drain(..).map(|cluster| cluster.hull).filter(|h| h.capacity() > 0);
         self.spare.extend(left);
         self.parts.clear();
+        // Room for any stretch: how long they are is chance. Each side of a hull is begun with all of its points.
+        self.corners.clear();
+        self.corners.reserve(points.len());
+        self.hull.clear();
+        self.hull.reserve(2 * points.len());
         for stretch in loose {
             self.waiting.push(stretch.clone());
             while let Some(range) = self.waiting.pop() {

@@ -111,8 +111,8 @@ impl Splitter {
         let shared = cloud.shared(points);
         let summed = (*frame, *tally);
         let found = fit_from(summed, ends.each_ref(), shared, again, &config.fit).ok()?;
-        let fit;
-        (fit, *frame, *tally) = found;
+        let (fit, found_in, summed) = found;
+        (*frame, *tally) = (found_in, summed);
         Some(fit)
     }
 }

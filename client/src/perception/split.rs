@@ -417,6 +417,7 @@ fn neighbours(pieces: &mut [Piece], i: usize) -> [&mut Piece; 2] {
 /// The inner point farthest from the chord, and how far in its own deviations, squared; of a run
 /// that ends where it began, the one farthest from there.
 fn farthest_from_chord(cloud: &Cloud, run: &Range<usize>) -> (usize, f64) {
+    const TOGETHER: usize = 8;
     let (a, b) = (cloud.columns.at(run.start), cloud.columns.at(run.end - 1));
     let chord = b - a;
     let length_sq = chord.norm_squared();
@@ -429,7 +430,6 @@ fn farthest_from_chord(cloud: &Cloud, run: &Range<usize>) -> (usize, f64) {
         let from = n.dot(&a);
         let off = |x: f64, y: f64| (n.x * x + n.y * y - from).abs();
         // So many at a time: that a new farthest is among them is rare, and which it is, is asked once.
-        const TOGETHER: usize = 8;
         let ((xs, x_rest), (ys, y_rest)) = (x.as_chunks::<TOGETHER>(), y.as_chunks::<TOGETHER>());
         let mut among = None;
         for (i, (x, y)) in xs.iter().zip(ys).enumerate() {
