@@ -196,9 +196,9 @@ where
     });
     let mut guess = sums.guess();
     guess.centre += first;
-    let again = |frame: &Frame| frame.tally(points.clone());
-    let frame = guess.frame();
     let shared = points.clone().map(|point| point.variance_shared).sum();
+    let again = move |frame: &Frame| frame.tally(points.clone());
+    let frame = guess.frame();
     let fitted = fit_from((frame, again(&frame)), [&first, &last], shared, again, config);
     fitted.map(|(fit, ..)| fit)
 }
