@@ -63,10 +63,12 @@
 //! * [`vector`]: observed segments and clusters, and the walls they fuse into.
 //! * [`raster`]: integer log-odds evidence and the tiles it adds up in.
 //! * [`gdb`]: the building as it was meant to be, cut to what a sensor would see of it.
+//! * [`changes`]: what a level's map says against a plan of the GDB.
 //! * [`level`]: contributions, the fold, and patches between two revisions.
 
 #[cfg(test)]
 mod chance;
+pub mod changes;
 pub mod gdb;
 pub mod geometry;
 pub mod landmarks;

@@ -1,6 +1,7 @@
 //! The way in: wire types are checked here, once, and become `mapfold_map` types.
 
 mod chains;
+pub mod changes;
 mod contribution;
 mod features;
 pub mod gdb;

@@ -50,6 +50,10 @@ pub const GDB_PLAN: &str = "/api/v1/sites/{site}/levels/{level}/gdb/plan";
 pub const GDB_PRIOR: &str = "/api/v1/sites/{site}/levels/{level}/gdb/prior";
 /// `GET`: the landmarks that robots find themselves by.
 pub const LANDMARKS: &str = "/api/v1/sites/{site}/levels/{level}/landmarks";
+/// `GET`: what robots found against the GDB.
+pub const CHANGES: &str = "/api/v1/sites/{site}/levels/{level}/changes";
+/// `POST`: what is made of one of them.
+pub const CHANGE: &str = "/api/v1/sites/{site}/levels/{level}/changes/{id}";
 /// `GET, PUT`: the library of a site.
 pub const PROTOTYPES: &str = "/api/v1/sites/{site}/prototypes";
 /// `GET`: exports.

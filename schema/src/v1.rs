@@ -9,6 +9,7 @@ mod gdb_log;
 mod import;
 mod jsonfg;
 mod level;
+mod model_change;
 mod model_file;
 mod patch;
 mod plan;
@@ -44,6 +45,10 @@ pub use jsonfg::{
     PrototypeFeature,
 };
 pub use level::{Bounds, Counts, LevelDescription, NewLevel};
+pub use model_change::{
+    Dismissal, ModelChange, ModelChangeAnswer, ModelChangeAnswered, ModelChangeKind,
+    ModelChangeState, ModelChanges, Motion, NewModelChangeAnswer, OpenStretch,
+};
 pub use model_file::{GdbDocument, KindCount, LeftOut, ModelFormat, ModelImport, ModelReport};
 pub use patch::{
     Patch, PriorTile, RasterChanges, Removed, TileAddress, TileEvidence, TilePlace, VectorPatch,

@@ -27,6 +27,7 @@ mod router;
 mod state;
 
 mod buildings;
+mod changes;
 mod contributions;
 mod docs;
 mod drawing;

@@ -8,6 +8,7 @@
 
 mod accept;
 mod append;
+pub mod changes;
 mod fold;
 pub(crate) mod folding;
 pub mod gdb;
@@ -45,6 +46,7 @@ pub use snapshot::Snapshot;
 use crate::store::levels::LevelRow;
 use crate::store::{Store, StoreError};
 use append::Waiting;
+use changes::ChangeCache;
 use gdb::ModelCache;
 use registry::DiskAlarm;
 use trial::Trial;
@@ -108,6 +110,8 @@ struct Shared {
     trials: mpsc::Sender<Trial>,
     /// Models of the GDB that were read.
     models: ModelCache,
+    /// What the map says against them.
+    changes: ChangeCache,
     store: Store,
     alarm: DiskAlarm,
 }

@@ -8,11 +8,13 @@
 //! * [`acts`]: what operators did to a log; [`revision_list`]: the columns that say to what.
 //! * [`imports`]: maps of other programs in a log, and what they say.
 //! * [`gdb`]: the a-priori model in a log; [`library`]: the prototypes of a site.
+//! * [`dismissals`]: what operators do not want to be told of any more.
 //! * [`log`]: reading the log; [`payload`]: the two columns that hold a contribution.
 //! * [`map_rows`]: the folded map, written behind; [`tile_cells`]: the column that holds a tile.
 
 pub mod acts;
 pub mod contributions;
+pub mod dismissals;
 pub mod gdb;
 pub mod imports;
 pub mod levels;

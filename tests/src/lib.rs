@@ -30,6 +30,7 @@ pub mod carmen;
 pub mod change;
 pub mod coverage;
 pub mod database;
+pub mod differences;
 pub mod error;
 pub mod evaluation;
 pub mod extraction;

@@ -6,8 +6,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use mapfold_tests::{
-    change, evaluation, extraction, figure, growth, honesty, range, raster, serving, speed,
-    structures,
+    change, differences, evaluation, extraction, figure, growth, honesty, range, raster, serving,
+    speed, structures,
 };
 
 /// Measures Mapfold and rewrites the tables of a report between their markers.
@@ -57,6 +57,12 @@ enum Command {
     /// Moves a shelf in a simulated hall and measures how soon the map believes it
     Change {
         /// The page with the markers `change`
+        #[arg(long, value_name = "FILE")]
+        report: PathBuf,
+    },
+    /// Removes, adds and moves things on simulated floors, and measures what is told against the model
+    Differences {
+        /// The page with the markers `differences`
         #[arg(long, value_name = "FILE")]
         report: PathBuf,
     },
@@ -118,6 +124,7 @@ async fn main() -> ExitCode {
         Command::Growth { report, data } => growth::tables(&report, data.as_deref()),
         Command::Extraction { report, data } => extraction::extraction(&report, data.as_deref()),
         Command::Change { report } => change::table(&report),
+        Command::Differences { report } => differences::table(&report),
         Command::Serving { report } => serving::tables(&report).await,
         Command::Structures { report } => structures::table(&report),
         Command::Figure { out } => figure::write(&out).await.map(|()| Vec::new()),

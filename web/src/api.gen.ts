@@ -76,6 +76,50 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/sites/{site}/levels/{level}/changes": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * What robots found against the published model, cut at a sensor's height: objects that are missing, opened or
+         *     stand elsewhere, and things that the model does not know; each with its evidence and what was said of it.
+         * @description A function of the map and of what is published: what robots see again, or no longer see, corrects itself. The
+         *     model is changed by nobody but operators.
+         */
+        get: operations["read_changes"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/sites/{site}/levels/{level}/changes/{id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Accepts a change into the draft of the model, dismisses it, or takes a dismissal back. Needs `map:edit`.
+         * @description Accepting is an edit like any other, with its author in the log: a missing object is removed, one that moved is put
+         *     where it stands, an opened wall gets doorways, and a new thing becomes an object with the outline that was seen, to
+         *     be corrected by hand. It is published like any other edit, too. What is so already stays so.
+         */
+        post: operations["answer_change"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/sites/{site}/levels/{level}/contributions": {
         parameters: {
             query?: never;
@@ -975,6 +1019,15 @@ export interface components {
              */
             tiles: number;
         };
+        /** @description Who dismissed a change. */
+        Dismissal: {
+            /** @description When. */
+            at: string;
+            /** @description Public id of the token. */
+            author: string;
+            /** @description Why, in the author's words. */
+            comment: string;
+        };
         /** @description How a doorway is closed: kept and shown; plans take doorways as open. */
         Door: {
             /**
@@ -1707,6 +1760,96 @@ export interface components {
              */
             tiles: number;
         };
+        /** @description A difference between the published model and what robots found. */
+        ModelChange: {
+            /** @description Clusters of the vector map that show it. */
+            clusters: string[];
+            dismissal?: components["schemas"]["Dismissal"] | null;
+            /**
+             * @description Where: the convex hull of what is missing, open or new, or of where the object stands now,
+             *     counter-clockwise.
+             */
+            hull_m: number[][];
+            /** @description Which one: the same for as long as it is the same thing. */
+            id: string;
+            /** @description What it is. */
+            kind: components["schemas"]["ModelChangeKind"];
+            /** @description When they were last seen. */
+            last_seen?: string | null;
+            /**
+             * Format: int32
+             * @description Distinct looks at the one of them that was seen most.
+             */
+            looks: number;
+            motion?: components["schemas"]["Motion"] | null;
+            /** @description What people call the object; may be empty. */
+            name?: string;
+            /**
+             * Format: uuid
+             * @description The object of the model; none for a new thing.
+             */
+            object?: string | null;
+            object_kind?: components["schemas"]["ObjectKind"] | null;
+            /**
+             * Format: double
+             * @description Surface of the object that scanners have looked at.
+             */
+            probed_m: number;
+            /** @description Who saw them. */
+            robots: string[];
+            /** @description Segments of the vector map that show it. */
+            segments: string[];
+            /** @description What was said of it. */
+            state: components["schemas"]["ModelChangeState"];
+            /** @description Of an opened object: where. */
+            stretches?: components["schemas"]["OpenStretch"][];
+            /**
+             * Format: double
+             * @description Surface of it that they look through.
+             */
+            through_m: number;
+        };
+        /**
+         * @description What an operator makes of a change.
+         * @enum {string}
+         */
+        ModelChangeAnswer: "accept" | "dismiss" | "reopen";
+        /** @description What became of a change. */
+        ModelChangeAnswered: {
+            /** @description The change as it is now. */
+            change: components["schemas"]["ModelChange"];
+            entry?: components["schemas"]["GdbEntry"] | null;
+        };
+        /**
+         * @description What has changed.
+         * @enum {string}
+         */
+        ModelChangeKind: "missing" | "opened" | "moved" | "new";
+        /**
+         * @description What an operator has said of a change.
+         * @enum {string}
+         */
+        ModelChangeState: "open" | "accepted" | "dismissed";
+        /** @description `GET L/changes`: all that robots found against the published model. */
+        ModelChanges: {
+            /** @description The changes, by identity. */
+            changes: components["schemas"]["ModelChange"][];
+            /**
+             * Format: double
+             * @description The height that the model was cut at.
+             */
+            height_m: number;
+            /**
+             * Format: int64
+             * @description The publication that it was held against; 0 if nothing is published, and then there are no changes.
+             */
+            publication: number;
+            /**
+             * Format: int64
+             * @description The revision of the map.
+             */
+            revision: number;
+        };
         /**
          * @description Formats that a model comes in as.
          * @enum {string}
@@ -1743,6 +1886,29 @@ export interface components {
             /** @description What is doubtful about it, in words. */
             warnings: string[];
         };
+        /** @description A rigid motion on the floor: turned about the level's origin, then shifted. */
+        Motion: {
+            /**
+             * Format: double
+             * @description How far the middle of the object is from where it should be.
+             */
+            distance_m: number;
+            /**
+             * Format: double
+             * @description Turn, counter-clockwise.
+             */
+            heading_rad: number;
+            /**
+             * Format: double
+             * @description Shift to the right.
+             */
+            x_m: number;
+            /**
+             * Format: double
+             * @description Shift up.
+             */
+            y_m: number;
+        };
         /** @description A level to be made. */
         NewLevel: {
             /**
@@ -1766,6 +1932,21 @@ export interface components {
              * @description Edge of a cell; 0.05 if absent.
              */
             resolution_m?: number | null;
+        };
+        /** @description `POST L/changes/{id}`. */
+        NewModelChangeAnswer: {
+            /** @description What is to become of it. */
+            answer: components["schemas"]["ModelChangeAnswer"];
+            /** @description Why, for those who read the log; at most 500 bytes. */
+            comment?: string;
+            kind?: components["schemas"]["ObjectKind"] | null;
+            /** @description Of a new thing or an opening that is accepted: what people are to call it. */
+            name?: string | null;
+            /**
+             * Format: double
+             * @description Of a new thing or an opening that is accepted: how high it is; 1 and 2.1 if absent.
+             */
+            upper_m?: number | null;
         };
         /** @description Which contributions are to be taken out: either `contributions`, or a `robot` and a time span. */
         NewRevert: {
@@ -1880,6 +2061,18 @@ export interface components {
              * @description Upper end, more than `from_m`.
              */
             to_m: number;
+        };
+        /** @description A stretch of surface that is seen through. */
+        OpenStretch: {
+            /**
+             * Format: double
+             * @description How thick the object is there; 0 for a sheet.
+             */
+            depth_m: number;
+            /** @description Where it begins; the object is on the right of the way to its end. */
+            from_m: number[];
+            /** @description Where it ends. */
+            to_m: number[];
         };
         /** @description `GET L/patches`: all that changed after `since`, in pages. */
         Patch: {
@@ -2867,6 +3060,106 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_changes: {
+        parameters: {
+            query?: {
+                /** @description Height of the sensors above the level's floor; 0.3 if absent. */
+                height_m?: number;
+            };
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The changes */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ModelChanges"];
+                };
+            };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    answer_change: {
+        parameters: {
+            query?: {
+                /** @description Height of the sensors above the level's floor; 0.3 if absent. */
+                height_m?: number;
+            };
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NewModelChangeAnswer"];
+            };
+        };
+        responses: {
+            /** @description It is so */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ModelChangeAnswered"];
+                };
+            };
+            /** @description `change_not_found`: robots see it no more, or at this height never did */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description `change_not_acceptable`: a person has to draw it */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description Refused; `code` says why */
             default: {

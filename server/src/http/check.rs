@@ -4,7 +4,7 @@ use mapfold_schema::border::{Violation, check_sensors};
 use mapfold_schema::instant::parse_rfc3339;
 use mapfold_schema::slug::{SLUG_LENGTH_MAX, is_slug};
 use mapfold_schema::v1::{
-    NewLevel, NewRevert, NewRobot, NewSite, RobotUpdate, Scope, SensorProfile,
+    NewLevel, NewModelChangeAnswer, NewRevert, NewRobot, NewSite, RobotUpdate, Scope, SensorProfile,
 };
 
 use super::problem::ApiError;
@@ -20,6 +20,8 @@ const NAMED_MAX: usize = 1000;
 const RESOLUTION_M: std::ops::RangeInclusive<f64> = 0.005..=1.0;
 /// Height of a floor over some datum.
 const ELEVATION_MAX_M: f64 = 10_000.0;
+/// Height of something on a floor.
+const UPPER_MAX_M: f64 = 100.0;
 /// Length of a slice of evidence, seconds: ten minutes, shorter than which few looks come together, to
 /// thirty days.
 const SLICE_S: std::ops::RangeInclusive<u32> = 600..=2_592_000;
@@ -104,6 +106,17 @@ pub(super) fn new_level(new: &NewLevel) -> Result<(), ApiError> {
     let fine = new.evidence_slice_s.is_none_or(|s| SLICE_S.contains(&s));
     let detail = format!("evidence is summed up for stretches of {low} to {high} seconds");
     findings.expect(fine, "/evidence_slice_s", "out_of_range", detail);
+    findings.done()
+}
+
+/// What is to become of a change against the GDB.
+pub(super) fn change_answer(new: &NewModelChangeAnswer) -> Result<(), ApiError> {
+    comment(&new.comment)?;
+    let mut findings = Findings::default();
+    findings.name(new.name.as_deref());
+    let fine = new.upper_m.is_none_or(|upper| upper > 0.0 && upper <= UPPER_MAX_M);
+    let detail = format!("a height of more than 0 and at most {UPPER_MAX_M} m");
+    findings.expect(fine, "/upper_m", "out_of_range", detail);
     findings.done()
 }
 

@@ -10,8 +10,8 @@ use utoipa::{Modify, OpenApi as _};
 use super::access::SESSION_COOKIE;
 use super::problem::ApiError;
 use super::{
-    batch, contributions, events, exports, gdb, health, imports, landmarks, levels, patches, plan,
-    prototypes, raster, reverts, robots, session, sites, tiles, vector,
+    batch, changes, contributions, events, exports, gdb, health, imports, landmarks, levels,
+    patches, plan, prototypes, raster, reverts, robots, session, sites, tiles, vector,
 };
 
 /// What stands at the head of the description.
@@ -42,6 +42,7 @@ const TAGS_WITH_VALIDATORS: [&str; 6] =
         events::follow, exports::read, imports::create, imports::list, imports::remove,
         gdb::read, gdb::replace, gdb::edit, gdb::publish, gdb::entries,
         plan::findings, plan::read, plan::make_prior, landmarks::read,
+        changes::read, changes::answer,
         prototypes::read, prototypes::replace,
         session::sign_in, session::describe, session::sign_out,
         health::live, health::ready, health::metrics,
@@ -55,7 +56,7 @@ const TAGS_WITH_VALIDATORS: [&str; 6] =
         (name = "robots", description = "Who contributes, with which sensors"),
         (name = "contributions", description = "Uploads, the log that they make, and reverts"),
         (name = "map", description = "The shared map, folded from all contributions"),
-        (name = "gdb", description = "The building as it was meant to be: drafts, publications, plans, landmarks"),
+        (name = "gdb", description = "The building as it was meant to be: drafts, publications, plans, landmarks, changes that robots found"),
         (name = "session", description = "Signing in on the page"),
         (name = "health", description = "For those who run the server"),
     ),

@@ -15,6 +15,7 @@ use mapfold_schema::v1::Scope;
 use crate::exchange::building::BuildingError;
 use crate::exchange::incoming::FileFault;
 use crate::exchange::nav2::{ImportError, Nav2Error};
+use crate::level::changes::NotAcceptable;
 use crate::level::{LevelError, RevertError, SinceError, SubmitError};
 use crate::store::StoreError;
 use crate::store::acts::RevertRefusal;
@@ -82,6 +83,8 @@ pub(super) enum ApiError {
     Store(StoreError),
     /// There is no image of this map.
     Nav2(Nav2Error),
+    /// A change that robots found cannot be taken over as it is.
+    NotAcceptableChange(NotAcceptable),
     /// The GDB was not changed, or cannot be shown.
     Gdb(Box<GdbRefusal>),
     /// A fault of ours.
@@ -202,6 +205,9 @@ impl ApiError {
                 of(415, "unsupported_media_type", detail)
             }
             Self::Import(error) => untaken(error),
+            Self::NotAcceptableChange(why) => {
+                of(409, "change_not_acceptable", sentence(&why.to_string()))
+            }
             Self::Building(error) => of(422, "invalid_building", sentence(&error.to_string())),
             Self::ModelFile(fault) => {
                 invalid("invalid_model_file", &sentence(&fault.to_string()), &fault.errors)

@@ -8,8 +8,9 @@ use mapfold_schema::route;
 use super::problem::ApiError;
 use super::state::App;
 use super::{
-    batch, contributions, docs, events, exports, gdb, health, imports, landmarks, layers, levels,
-    page, patches, plan, prototypes, raster, reverts, robots, session, sites, tiles, vector,
+    batch, changes, contributions, docs, events, exports, gdb, health, imports, landmarks, layers,
+    levels, page, patches, plan, prototypes, raster, reverts, robots, session, sites, tiles,
+    vector,
 };
 
 /// All routes, with all layers around them.
@@ -58,6 +59,8 @@ pub fn router(app: &App) -> Router {
         .route(route::GDB_FINDINGS, get(plan::findings))
         .route(route::GDB_PLAN, get(plan::read))
         .route(route::GDB_PRIOR, post(plan::make_prior))
+        .route(route::CHANGES, get(changes::read))
+        .route(route::CHANGE, post(changes::answer))
         .route(route::LANDMARKS, get(landmarks::read))
         .route(
             route::PROTOTYPES,

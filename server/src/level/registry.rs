@@ -9,6 +9,7 @@ use tokio::sync::{Mutex as AsyncMutex, Notify, broadcast, mpsc, watch};
 use tokio::task::JoinHandle;
 
 use super::append::Appender;
+use super::changes::ChangeCache;
 use super::fold::Folder;
 use super::gdb::ModelCache;
 use super::open::{self, Opened};
@@ -305,6 +306,7 @@ impl Inner {
             look,
             trials,
             models: ModelCache::default(),
+            changes: ChangeCache::default(),
             store: self.store.clone(),
             alarm: self.alarm.clone(),
         });

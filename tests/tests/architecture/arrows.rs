@@ -67,6 +67,7 @@ const MODULES: &[(&str, &[ModuleRule])] = &[
                 ],
             ),
             ("level", &["geometry", "raster", "vector"]),
+            ("changes", &["gdb", "geometry", "level", "raster", "vector"]),
         ],
     ),
     (
