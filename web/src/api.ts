@@ -18,6 +18,9 @@ import type {
   ImportReport,
   LandmarkTable,
   LevelDescription,
+  ModelChangeAnswer,
+  ModelChangeAnswered,
+  ModelChanges,
   NewRevert,
   Problem,
   PrototypeCollection,
@@ -106,6 +109,10 @@ export interface Api {
   plan: (place: Place, view: ModelView, signal: AbortSignal) => Promise<GdbPlan>;
   /** Its landmarks at a height, as it is published. */
   landmarks: (place: Place, heightM: number, signal: AbortSignal) => Promise<LandmarkTable>;
+  /** What robots found against what is published, cut at a height. */
+  changes: (place: Place, heightM: number) => Promise<ModelChanges>;
+  /** What is to become of one of them. */
+  answerChange: (place: Place, id: string, answer: ModelChangeAnswer, heightM: number) => Promise<ModelChangeAnswered>;
   vector: (place: Place, since: number, signal: AbortSignal) => Promise<VectorPatch>;
   raster: (place: Place, since: number, signal: AbortSignal) => Promise<RasterChanges>;
   /** One picture of the raster; null where there is nothing to see. */
@@ -235,6 +242,9 @@ export function createApi(browser: Browser): Api {
     plan: (place, { heightM, state }, signal) =>
       askJson(`${levelPath(place)}/gdb/plan?height_m=${heightM}&state=${state}`, { signal }),
     landmarks: (place, heightM, signal) => askJson(`${levelPath(place)}/landmarks?height_m=${heightM}`, { signal }),
+    changes: (place, heightM) => askJson(`${levelPath(place)}/changes?height_m=${heightM}`),
+    answerChange: (place, id, answer, heightM) =>
+      askJson(`${levelPath(place)}/changes/${encodeURIComponent(id)}?height_m=${heightM}`, posted({ answer })),
     vector: (place, since, signal) => askJson(`${levelPath(place)}/vector?since=${since}`, { signal }),
     raster: (place, since, signal) => askJson(`${levelPath(place)}/raster?since=${since}`, { signal }),
     picture: async (place, picture, evidence) => {

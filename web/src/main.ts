@@ -3,6 +3,7 @@
 
 import { createApi } from "./api";
 import { setShown } from "./dom";
+import { createChangeActions } from "./changing";
 import { createDraftActions } from "./drafting";
 import { createEditActions } from "./editing/acting";
 import { commanded } from "./editing/commands";
@@ -13,6 +14,7 @@ import { createImportActions } from "./importing";
 import { createMapView } from "./map/view";
 import { followModel, type ModelFollower } from "./modelling";
 import { DARK, LIGHT, type Theme } from "./palette";
+import { createChangesCard } from "./panels/changes_card";
 import { createContributionsCard } from "./panels/contributions_card";
 import { createEditBar } from "./panels/edit_bar";
 import { createEditCard } from "./panels/edit_card";
@@ -86,6 +88,7 @@ const overMap = byId("over-map");
 const log = createLogActions({ api, state: store.state, dispatch, uuid });
 const prior = createImportActions({ api, state: store.state, dispatch });
 const draft = createDraftActions({ api, state: store.state, dispatch });
+const changes = createChangeActions({ api, state: store.state, dispatch, timers });
 const edit = createEditActions({ api, state: store.state, dispatch, memory: window.localStorage, timers });
 const draws = [
   createHeader({ parent: byId("header"), store, onSignOut: () => void signOut(api, dispatch) }),
@@ -93,6 +96,7 @@ const draws = [
   createRobotsCard(panels, { store, theme }),
   createLayersCard(panels, store),
   createModelCard(panels, { store, actions: draft }),
+  createChangesCard(panels, { store, actions: changes }),
   createPriorCard(panels, prior),
   createContributionsCard(panels, { store, theme, onOpenLog: log.open }),
   createLogPanel({ parent: page, store, theme, actions: log }),
@@ -155,6 +159,8 @@ store.onChange((state, before) => {
     draft.refresh();
     edit.refresh();
   }
+  const isAnotherHeight = before.model.view.heightM !== state.model.view.heightM;
+  if (isAnotherHeight || before.level?.revision !== state.level?.revision) changes.refresh();
   const { copy, clashes } = state.editing;
   if (copy !== null && (copy !== before.editing.copy || clashes !== before.editing.clashes)) edit.changed();
   if (state.imports.open && before.level !== state.level) prior.refresh();

@@ -6,6 +6,7 @@ import type { LayerName, Layers, LayerSetting } from "./layers";
 import { withSlots } from "./palette";
 import type { Permalink, Place, View } from "./permalink";
 import type { Evidence } from "./pyramid";
+import { NO_CHANGES, type ChangesState } from "./changes";
 import { NO_DRAFT, type DraftState } from "./drafts";
 import { NO_EDITING, type EditingState } from "./editing";
 import { NO_IMPORTS, type ImportsState } from "./imports";
@@ -65,6 +66,7 @@ export interface State {
   imports: ImportsState;
   model: ModelState;
   draft: DraftState;
+  changes: ChangesState;
   editing: EditingState;
   link: Link;
   layers: Layers;
@@ -93,6 +95,7 @@ export type Event =
   | { kind: "log"; log: Partial<LogState> }
   | { kind: "imports"; imports: Partial<ImportsState> }
   | { kind: "draft"; draft: Partial<DraftState> }
+  | { kind: "changes"; changes: Partial<ChangesState> }
   | { kind: "editing"; editing: Partial<EditingState> }
   | { kind: "model"; model: Partial<ModelState> }
   | { kind: "model-view"; view: Partial<ModelView> }
@@ -120,6 +123,7 @@ const NO_LEVEL = {
   log: NO_LOG,
   imports: NO_IMPORTS,
   draft: NO_DRAFT,
+  changes: NO_CHANGES,
   editing: NO_EDITING,
   link: { kind: "idle" },
   selection: null,
@@ -186,6 +190,8 @@ export function update(state: State, event: Event): State {
       return { ...state, imports: { ...state.imports, ...event.imports } };
     case "draft":
       return { ...state, draft: { ...state.draft, ...event.draft } };
+    case "changes":
+      return { ...state, changes: { ...state.changes, ...event.changes } };
     case "editing":
       return { ...state, editing: { ...state.editing, ...event.editing } };
     case "model":

@@ -81,6 +81,15 @@ export type GdbEntryPage = Wire["GdbEntryPage"];
 export type GdbFinding = Exactly<Wire["GdbFinding"], { at_m?: [number, number, number] | null }>;
 export type GdbFindings = Exactly<Wire["GdbFindings"], { findings: GdbFinding[] }>;
 export type GdbAnswer = Wire["GdbAnswer"];
+export type ModelChangeKind = Wire["ModelChangeKind"];
+export type ModelChangeState = Wire["ModelChangeState"];
+export type ModelChangeAnswer = Wire["ModelChangeAnswer"];
+export type ModelChange = Exactly<
+  Wire["ModelChange"],
+  { hull_m: [number, number][]; stretches?: Exactly<Wire["OpenStretch"], { from_m: [number, number]; to_m: [number, number] }>[] }
+>;
+export type ModelChanges = Exactly<Wire["ModelChanges"], { changes: ModelChange[] }>;
+export type ModelChangeAnswered = Exactly<Wire["ModelChangeAnswered"], { change: ModelChange }>;
 export type LandmarkKind = Wire["LandmarkKind"];
 export type Landmark = Exactly<Wire["Landmark"], { at_m: [number, number]; covariance: Matrix3 }>;
 export type LandmarkTable = Exactly<Wire["LandmarkTable"], { landmarks: Landmark[] }>;

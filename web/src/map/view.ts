@@ -23,6 +23,7 @@ import { batchesOf } from "./batches";
 import type { Frame } from "./frame";
 import { createGestures } from "./gestures";
 import { paintChains } from "./paint_chains";
+import { paintChanges } from "./paint_changes";
 import { paintClusters } from "./paint_clusters";
 import { paintEditing } from "./paint_editing";
 import { paintGrid } from "./paint_grid";
@@ -149,6 +150,7 @@ export function createMapView(options: MapViewOptions): MapView {
     LAYER_NAMES.map((name) => [name, createPainterLayer(name, painters[name])]),
   ) as Record<LayerName, Layer>;
   const selectionLayer = createPainterLayer("selection", (frame) => {
+    if (state.changes.open) paintChanges(frame, state.changes.list ?? [], theme());
     paintSelection(frame, state, theme());
     paintPreview(frame, state, theme());
   });
@@ -341,6 +343,7 @@ function drawnFrom(state: State): readonly unknown[] {
     state.evidence,
     state.level,
     state.model,
+    state.changes,
     state.editing,
     state.nowMs,
   ];
