@@ -87,6 +87,12 @@ async fn the_page_draws_a_room_that_robots_then_know() -> Result<(), Error> {
     assert_eq!(event("still_there")["unsent"], 1, "{said}");
     assert!(text("settled", "text").contains("2 objects"), "{said}");
 
+    // By finger on a tablet: one wall drawn, chosen and dragged, and the page no wider than the screen.
+    assert_eq!(event("tablet")["length_m"], 2.0, "{said}");
+    assert_eq!(event("tablet")["angle_deg"], 0.0, "{said}");
+    assert_eq!(event("tablet")["unsent"], 1, "{said}");
+    assert_eq!(event("tablet")["scroll_width"], 834, "{said}");
+
     the_model_is_what_was_drawn(&level).await?;
     robots_know_the_corners(&level).await
 }

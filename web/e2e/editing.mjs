@@ -15,6 +15,7 @@
 //   {"event": "refused", "text", "news", "clashes", "unsent"} a second operator's stale edit
 //   {"event": "still_there", "clashes", "unsent"}             after the page was loaded again
 //   {"event": "settled", "text", "clashes", "unsent"}         with that edit made after all
+//   {"event": "tablet", "length_m", "angle_deg", "scroll_width", "unsent"}  a wall drawn and dragged with a finger
 //   {"event": "end", "console_errors": [...]}
 //
 // Ends with status 1 when something does not show in time, or the browser complained.
@@ -51,9 +52,9 @@ function say(line) {
 const consoleErrors = [];
 const browser = await launchBrowser();
 
-/** @param {string} token */
-async function opened(token) {
-  const context = await browser.newContext({ viewport: { width: 1440, height: 900 }, timezoneId: "Europe/Berlin" });
+/** @param {string} token @param {import("playwright-core").BrowserContextOptions} [options] */
+async function opened(token, options = { viewport: { width: 1440, height: 900 } }) {
+  const context = await browser.newContext({ ...options, timezoneId: "Europe/Berlin" });
   const page = await context.newPage();
   page.setDefaultTimeout(PATIENCE_MS);
   page.on("console", (message) => {
@@ -101,6 +102,23 @@ async function drag(page, from, to) {
   await page.mouse.move((x0 + x1) / 2, (y0 + y1) / 2, { steps: 4 });
   await page.mouse.move(x1, y1, { steps: 4 });
   await page.mouse.up();
+}
+
+/** With a finger. @param {Page} page @param {readonly [number, number]} at */
+async function tapAt(page, at) {
+  await page.touchscreen.tap(...(await onScreen(page, at)));
+  await page.waitForTimeout(350);
+}
+
+/** With a finger. @param {Page} page @param {readonly [number, number]} from @param {readonly [number, number]} to */
+async function slide(page, from, to) {
+  const browserSide = await page.context().newCDPSession(page);
+  const [[x0, y0], [x1, y1]] = [await onScreen(page, from), await onScreen(page, to)];
+  for (let step = 0; step <= 5; step++) {
+    const point = { x: x0 + ((x1 - x0) * step) / 5, y: y0 + ((y1 - y0) * step) / 5 };
+    await browserSide.send("Input.dispatchTouchEvent", { type: step === 0 ? "touchStart" : "touchMove", touchPoints: [point] });
+  }
+  await browserSide.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
 }
 
 /** @param {Page} page @param {string} name */
@@ -151,7 +169,7 @@ try {
   await until(page, "objects", 7);
   await drag(page, [1.7, 1.3], [3.02, 1.78]);
   await page.keyboard.press("r");
-  await page.locator("#edit-yaw").waitFor();
+  await page.locator("#edit-figure-yaw").waitFor();
   say({ event: "drawn", ...(await facts(page)) });
   await shoot(page, "drawn");
 
@@ -172,7 +190,7 @@ try {
   const chosenInSpace = await page.locator(".space-chosen").innerText();
   await page.keyboard.press("3");
   await until(page, "space", "");
-  say({ event: "space", chosen_before: before.chosen, chosen: chosenInSpace, on_the_map: await page.locator(".edit-row .hint").innerText(), x_m: Number(await page.locator("#edit-x").inputValue()) });
+  say({ event: "space", chosen_before: before.chosen, chosen: chosenInSpace, on_the_map: await page.locator(".edit-row .hint").innerText(), x_m: Number(await page.locator("#edit-figure-x").inputValue()) });
   await page.mouse.click(...(await onScreen(page, [3, 1.8])));
   await until(page, "chosen", 1);
 
@@ -204,10 +222,7 @@ try {
   // A second operator moves a table and draws a wall, and does not hear that the first one moves the table too.
   const second = await opened(setting("SECOND"));
   await editing(second);
-  await second.route("**/gdb/entries*", async (route) => {
-    await new Promise((resolve) => setTimeout(resolve, 20_000));
-    await route.continue().catch(() => undefined);
-  });
+  await second.route("**/gdb/entries*", (route) => route.abort());
   await drag(second, [1.2, 1.8], [1.2, 2.3]);
   await second.keyboard.press("w");
   await clickAt(second, [-2, 0]);
@@ -240,6 +255,22 @@ try {
   await until(page, "objects", 8);
   await page.locator(".edit-news li").first().waitFor();
   await shoot(page, "news");
+
+  // On a tablet, with a finger: a wall by taps, chosen and dragged; what is not chosen leaves the map to be moved.
+  const tablet = await opened(setting("SECOND"), { viewport: { width: 834, height: 1112 }, hasTouch: true });
+  await editing(tablet);
+  await tablet.locator("#tool-wall").tap();
+  await tapAt(tablet, [0.98, -2.1]);
+  await tapAt(tablet, [3.03, -2.02]);
+  await tablet.locator("#edit-finish").tap();
+  await until(tablet, "unsent", 1);
+  await tablet.locator("#tool-select").tap();
+  await slide(tablet, [2, -2.05], [2.5, -1.55]);
+  await shoot(tablet, "tablet");
+  await tablet.locator("#edit-figure-length").waitFor();
+  const [length, angle] = [await tablet.locator("#edit-figure-length").inputValue(), await tablet.locator("#edit-figure-angle").inputValue()];
+  const wide = await tablet.evaluate(() => document.documentElement.scrollWidth);
+  say({ event: "tablet", length_m: Number(length), angle_deg: Number(angle), scroll_width: wide, ...(await facts(tablet)) });
   say({ event: "end", console_errors: consoleErrors });
   if (consoleErrors.length > 0) process.exitCode = 1;
 } finally {

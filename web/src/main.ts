@@ -89,7 +89,7 @@ const log = createLogActions({ api, state: store.state, dispatch, uuid });
 const prior = createImportActions({ api, state: store.state, dispatch });
 const draft = createDraftActions({ api, state: store.state, dispatch });
 const changes = createChangeActions({ api, state: store.state, dispatch, timers });
-const edit = createEditActions({ api, state: store.state, dispatch, memory: window.localStorage, timers });
+const edit = createEditActions({ api, state: store.state, dispatch, memory: window.localStorage, timers, uuid });
 const draws = [
   createHeader({ parent: byId("header"), store, onSignOut: () => void signOut(api, dispatch) }),
   createLevelCard(panels),

@@ -14,6 +14,7 @@ import { stillThere } from "./choosing";
 import { unsent, withSent, workingCopy, type Puts, type Version } from "./history";
 import { kept, keyOf, restored, together } from "./keeping";
 import { nameOf, type Library, type Objects } from "./objects";
+import { finished } from "./pointing";
 import { rebased, type Clash, type Rebased } from "./rebasing";
 
 /** Entries of the log that are read to say what others did. */
@@ -55,9 +56,10 @@ export interface EditActionsOptions {
   dispatch: Dispatch;
   memory: Memory;
   timers: Timers;
+  uuid: () => string;
 }
 
-export function createEditActions({ api, state, dispatch, memory, timers }: EditActionsOptions): EditActions {
+export function createEditActions({ api, state, dispatch, memory, timers, uuid }: EditActionsOptions): EditActions {
   let reading = new AbortController();
   let checking = new AbortController();
   let quiet: number | null = null;
@@ -194,6 +196,8 @@ export function createEditActions({ api, state, dispatch, memory, timers }: Edit
   return {
     start,
     stop: () => {
+      // Walls that are being drawn end where they have come to.
+      change(finished(state().editing, { uuid }));
       keep();
       checking.abort();
       const { place, editing } = state();

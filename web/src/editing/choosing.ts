@@ -9,7 +9,7 @@ export function objectAt(objects: Objects, library: Library, at: Point, withinM:
   let [best, least] = [null as string | null, Infinity];
   for (const [id, object] of objects) {
     const box = boxOf(object, library);
-    if (box === null || !holds([box[0] - withinM, box[1] - withinM, box[2] + withinM, box[3] + withinM], [at[0], at[1], at[0], at[1]])) continue;
+    if (box === null || at[0] < box[0] - withinM || at[0] > box[2] + withinM || at[1] < box[1] - withinM || at[1] > box[3] + withinM) continue;
     if (!covers(object, library, at, withinM)) continue;
     const size = (object.kind === "corridor" ? 1e9 : object.kind === "doorway" ? 0 : 1) + groundArea(object, library) * 1e-6;
     if (size < least) [best, least] = [id, size];

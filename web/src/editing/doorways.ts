@@ -4,7 +4,7 @@
 import type { Point } from "../geometry";
 import type { GdbObject } from "../wire";
 import { groundsOf, middleOf, rounded, uprightAt, type Objects } from "./objects";
-import { angleOf, coordinatesOn, lengthOf, placeOn, type Wall } from "./walls";
+import { angleOf, coordinatesOn, isAbout, lengthOf, placeOn, type Wall } from "./walls";
 
 /** How far a doorway reaches beyond its wall on either side. */
 const DEEPER_M = 0.05;
@@ -51,6 +51,7 @@ export function hostOf(doorway: GdbObject, walls: Iterable<readonly [string, Wal
   if (middle === null) return null;
   let [best, least] = [null as string | null, Infinity];
   for (const [id, wall] of walls) {
+    if (!isAbout(wall, middle, wall.thicknessM / 2 + IN_WALL_WITHIN_M)) continue;
     const { alongM, acrossM } = coordinatesOn(wall, middle);
     const off = Math.abs(acrossM);
     if (alongM < 0 || alongM > lengthOf(wall) || off > wall.thicknessM / 2 + IN_WALL_WITHIN_M || off >= least) continue;

@@ -12,7 +12,7 @@ export type Library = ReadonlyMap<string, GdbPrototype>;
 
 /** One polygon on the floor, with the heights that a solid has there. */
 export interface Ground {
-  /** The outer ring first, then holes; the first corner is not repeated. */
+  /** The outer ring first, counter-clockwise, then holes; the first corner is not repeated. */
   rings: readonly (readonly Point[])[];
   lowerM: number;
   upperM: number;
@@ -121,12 +121,17 @@ function groundOf(object: GdbObject, solid: GdbSolid): Ground {
   if (loose === null && upright) {
     const z = placementOf(object).position[2];
     const placed = rings.map((ring) => ring.map(([x, y]): Point => onFloor(pointInLevel(object, [x, y, 0]))));
-    return { rings: placed, lowerM: lowerM + z, upperM: upperM + z };
+    const [outer = [], ...holes] = placed;
+    return { rings: [isClockwise(outer) ? outer.reverse() : outer, ...holes], lowerM: lowerM + z, upperM: upperM + z };
   }
   const corners = loose ?? rings.flat().flatMap(([x, y]): Triple[] => [[x, y, lowerM], [x, y, upperM]]);
   const placed = corners.map((corner) => pointInLevel(object, corner));
   const heights = placed.map(([, , z]) => z);
   return { rings: [hullOf(placed.map(onFloor))], lowerM: Math.min(...heights), upperM: Math.max(...heights) };
+}
+
+function isClockwise(ring: readonly Point[]): boolean {
+  return ring.reduce((sum, [x, y], n) => sum + x * (ring[(n + 1) % ring.length]?.[1] ?? y) - y * (ring[(n + 1) % ring.length]?.[0] ?? x), 0) < 0;
 }
 
 function onFloor([x, y]: Triple): Point {
@@ -173,10 +178,22 @@ export function hullOf(points: readonly Point[]): Point[] {
   return [...half(sorted), ...half(sorted.reverse())];
 }
 
+const boxes = new WeakMap<readonly Ground[], Box | "none">();
+
 /** The box around an object on the floor; null if it covers nothing. */
 export function boxOf(object: GdbObject, library: Library): Box | null {
+  const own = groundsOf(object, library);
+  let box = boxes.get(own);
+  if (box === undefined) {
+    box = boxAround(own) ?? "none";
+    boxes.set(own, box);
+  }
+  return box === "none" ? null : box;
+}
+
+function boxAround(own: readonly Ground[]): Box | null {
   let box: Box | null = null;
-  for (const { rings } of groundsOf(object, library)) {
+  for (const { rings } of own) {
     for (const [x, y] of rings.flat()) box = union(box, [x, y, x, y]);
   }
   return box;

@@ -2,7 +2,7 @@
 // wall; where a direction of 15 degrees meets a wall; a wall; a direction of 15 degrees; the grid. Pure.
 
 import type { Piece, Point } from "../geometry";
-import { angleOf, axisOf, coordinatesOn, isSamePlace, lengthOf, placeOn, type Wall } from "./walls";
+import { angleOf, axisOf, coordinatesOn, isAbout, isSamePlace, lengthOf, placeOn, type Wall } from "./walls";
 
 export type SnapKind = "end" | "perpendicular" | "crossing" | "wall" | "angle" | "grid" | "free";
 
@@ -78,6 +78,7 @@ export function snap(at: Point, options: SnapOptions): Snap {
 }
 
 function isNear(wall: Wall, at: Point, withinM: number): boolean {
+  if (!isAbout(wall, at, withinM)) return false;
   const { alongM, acrossM } = coordinatesOn(wall, at);
   return Math.abs(acrossM) <= withinM && alongM >= -withinM && alongM <= lengthOf(wall) + withinM;
 }

@@ -20,11 +20,19 @@ export interface WallSize {
 /** With the doorways that stand in the walls among them. */
 export function withDoorways(objects: Objects, chosen: Iterable<string>): Set<string> {
   const all = new Set(chosen);
-  const walls = new Map([...wallsAmong(objects)].filter(([id]) => all.has(id)));
+  const walls = chosenWalls(objects, all);
   if (walls.size === 0) return all;
-  // Of all walls, as a doorway may stand where two meet.
   for (const [, doorways] of doorwaysIn(objects, walls)) for (const id of doorways) all.add(id);
   return all;
+}
+
+function chosenWalls(objects: Objects, chosen: Iterable<string>): Map<string, Wall> {
+  const [all, walls] = [wallsAmong(objects), new Map<string, Wall>()];
+  for (const id of chosen) {
+    const wall = all.get(id);
+    if (wall !== undefined) walls.set(id, wall);
+  }
+  return walls;
 }
 
 /** With the walls joined anew that end where walls changed. */
@@ -92,7 +100,7 @@ export function removed(objects: Objects, chosen: Iterable<string>): Puts {
 /** Walls as they are to be; their doorways follow. */
 export function reshaped(objects: Objects, walls: ReadonlyMap<string, Wall>): Puts {
   const puts = new Map<string, GdbObject>();
-  const before = new Map([...wallsAmong(objects)].filter(([id]) => walls.has(id)));
+  const before = chosenWalls(objects, walls.keys());
   const doorways = doorwaysIn(objects, before);
   for (const [id, wall] of walls) {
     const [object, from] = [objects.get(id), before.get(id)];

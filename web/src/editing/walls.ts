@@ -38,6 +38,12 @@ export function axisOf({ a, b }: Wall): Piece {
   return [a[0], a[1], b[0], b[1]];
 }
 
+/** Whether a place is in the box around a wall's axis, widened by so much: most walls are told apart by that alone. */
+export function isAbout({ a, b }: Wall, [x, y]: Point, withinM: number): boolean {
+  if (x < Math.min(a[0], b[0]) - withinM || x > Math.max(a[0], b[0]) + withinM) return false;
+  return y >= Math.min(a[1], b[1]) - withinM && y <= Math.max(a[1], b[1]) + withinM;
+}
+
 /** The place on a wall's axis at a distance from its first end. */
 export function placeOn(wall: Wall, alongM: number): Point {
   const [cos, sin] = [Math.cos(angleOf(wall)), Math.sin(angleOf(wall))];
@@ -63,13 +69,18 @@ export function wallOf(object: GdbObject): Wall | null {
   return wall === "none" ? null : wall;
 }
 
+const knownAmong = new WeakMap<Objects, ReadonlyMap<string, Wall>>();
+
 /** The simple walls among objects. */
-export function wallsAmong(objects: Objects): Map<string, Wall> {
+export function wallsAmong(objects: Objects): ReadonlyMap<string, Wall> {
+  const before = knownAmong.get(objects);
+  if (before !== undefined) return before;
   const walls = new Map<string, Wall>();
   for (const [id, object] of objects) {
     const wall = object.kind === "wall" ? wallOf(object) : null;
     if (wall !== null) walls.set(id, wall);
   }
+  knownAmong.set(objects, walls);
   return walls;
 }
 
@@ -146,7 +157,7 @@ export function isSamePlace(p: Point, q: Point): boolean {
  */
 export function rejoined(objects: Objects, places: readonly Point[]): Map<string, GdbObject> {
   const walls = wallsAmong(objects);
-  const endsAt = (wall: Wall): boolean => places.some((place) => endsOf(wall).some((end) => isSamePlace(end, place)));
+  const endsAt = (wall: Wall): boolean => places.some((place) => isSamePlace(wall.a, place) || isSamePlace(wall.b, place));
   const next = new Map<string, GdbObject>();
   const near = [...walls].filter(([, wall]) => endsAt(wall));
   for (const [id, wall] of near) {
@@ -168,11 +179,12 @@ interface Leaving {
 
 function fillersAt(id: string, end: Point, walls: ReadonlyMap<string, Wall>): Point[][] {
   const leaving: Leaving[] = [];
-  for (const [other, { a, b, thicknessM, ...heights }] of walls) {
+  for (const [other, one] of walls) {
+    if (!isAbout(one, end, JOINED_WITHIN_M)) continue;
+    const { a, b, thicknessM } = one;
     const [atA, atB] = [isSamePlace(a, end), isSamePlace(b, end)];
     if (atA === atB) continue;
-    const angle = angleOf(atA ? { a, b, thicknessM, ...heights } : { a: b, b: a, thicknessM, ...heights });
-    leaving.push({ id: other, angle, half: thicknessM / 2 });
+    leaving.push({ id: other, angle: angleOf(atA ? one : { ...one, a: b, b: a }), half: thicknessM / 2 });
   }
   leaving.sort((one, other) => one.angle - other.angle);
   const rings: Point[][] = [];
@@ -213,8 +225,10 @@ export function nearestWall(walls: Iterable<readonly [string, Wall]>, at: Point,
   let best: { id: string; wall: Wall } | null = null;
   let least = Infinity;
   for (const [id, wall] of walls) {
+    const reachM = Math.max(withinM, wall.thicknessM / 2);
+    if (!isAbout(wall, at, reachM)) continue;
     const distance = distanceToPiece(at, axisOf(wall));
-    if (distance > Math.max(withinM, wall.thicknessM / 2) || distance >= least) continue;
+    if (distance > reachM || distance >= least) continue;
     [best, least] = [{ id, wall }, distance];
   }
   return best;

@@ -18,7 +18,7 @@ const DASH_PX: Readonly<Partial<Record<ObjectKind, readonly number[]>>> = { corr
 /** From below to above. */
 const ORDER: readonly ObjectKind[] = ["corridor", "wall", "machine", "furniture", "other", "doorway"];
 const CLASH_DASH_PX = [7, 4];
-const HALO_PX = 7;
+const HALO_PX = 10;
 const HANDLE_PX = 5;
 const MARK_PX = 6;
 /** Objects at least this long on the screen are named. */
@@ -85,17 +85,24 @@ function paintKind(frame: Frame, objects: readonly [string, GdbObject][], { kind
   pen.fillStyle = kind === "doorway" ? theme.unknown : colour;
   pen.lineJoin = "miter";
   pen.setLineDash([...(DASH_PX[kind] ?? [])]);
-  // Filled solid by solid, as those that overlap would cancel out in one path.
+  const grounds = objects.flatMap(([, object]) => groundsOf(object, library));
   pen.globalAlpha = alpha * FILL_ALPHA[kind];
-  for (const [, object] of objects) {
-    for (const { rings } of groundsOf(object, library)) {
-      pen.beginPath();
-      for (const ring of rings) {
-        trace(frame, ring);
-        pen.closePath();
-      }
-      pen.fill("evenodd");
+  // All in one path: outer rings run the same way, so that what overlaps is filled once.
+  pen.beginPath();
+  for (const { rings: [outer, ...holes] } of grounds) {
+    if (outer === undefined || holes.length > 0) continue;
+    trace(frame, outer);
+    pen.closePath();
+  }
+  pen.fill("nonzero");
+  for (const { rings } of grounds) {
+    if (rings.length < 2) continue;
+    pen.beginPath();
+    for (const ring of rings) {
+      trace(frame, ring);
+      pen.closePath();
     }
+    pen.fill("evenodd");
   }
   pen.globalAlpha = alpha;
   pen.beginPath();

@@ -197,7 +197,7 @@ function figureRow(store: Store, actions: EditActions): Row<Figure> {
       figure = now;
       setText(label, now.label);
       setText(unit, now.unit);
-      input.id = `edit-${now.id}`;
+      input.id = `edit-figure-${now.id}`;
       input.step = String(now.step);
       if (now.min !== undefined) input.min = String(now.min);
       if (document.activeElement !== input && input.value !== String(now.value ?? "")) input.value = String(now.value ?? "");

@@ -2,6 +2,7 @@
 
 import { mayPublish, type DraftActions } from "../drafting";
 import { entryInWords, entryProvenance, placeOf, readiness, READINESS_WORDS } from "../drafts";
+import { unsentCount } from "../editing";
 import { el, keyed, logRow, setShown, setText } from "../dom";
 import type { State } from "../state";
 import type { Store } from "../store";
@@ -17,6 +18,7 @@ export function createModelCard(parent: HTMLElement, { store, actions }: { store
   const now = el("p", { class: "model-now", attrs: { role: "status" } });
   const publish = el("button", { class: "primary", text: "Publish", attrs: { type: "button", id: "model-publish" }, on: { click: actions.publish } });
   const barred = el("p", { class: "hint", text: "To publish, sign in with a token that has the scope map:publish." });
+  const unsent = el("p", { class: "hint", text: "What is edited and not in the draft yet would not be published: send it first." });
   const problem = el("p", { class: "problem", attrs: { role: "alert" } });
   const done = el("p", { class: "done", attrs: { role: "status" } });
   const findings = el("ul", { class: "findings", attrs: { "aria-label": "What is wrong with the draft" } });
@@ -35,6 +37,7 @@ export function createModelCard(parent: HTMLElement, { store, actions }: { store
     el("summary", {}, el("h2", { text: "Model" })),
     el("div", { class: "folding-head" }, now, publish),
     barred,
+    unsent,
     problem,
     done,
     findings,
@@ -52,6 +55,7 @@ export function createModelCard(parent: HTMLElement, { store, actions }: { store
     setShown(publish, may && ready !== "no-model" && ready !== "unknown");
     publish.disabled = draft.busy !== null || ready !== "ready";
     setShown(barred, !may);
+    setShown(unsent, may && unsentCount(state.editing) > 0);
     for (const [line, text] of [[problem, draft.problem], [done, draft.done]] as const) {
       setShown(line, text !== null);
       setText(line, text ?? "");

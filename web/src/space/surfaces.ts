@@ -29,6 +29,7 @@ export interface Part {
 interface Hull {
   corners: Triple[];
   faces: number[][][];
+  edges: [number, number][];
 }
 
 const CYLINDER_SIDES = 32;
@@ -49,10 +50,12 @@ export function surfacesOf(objects: Objects, library: Library, kinds: ReadonlySe
     for (const solid of solids) {
       const hull = hullOf(solid);
       const corners = hull.corners.map((corner) => pointInLevel(object, corner));
-      const met = new Set<string>();
       for (const rings of hull.faces) {
         for (const index of facesOf(corners, rings)) triangles.push(...(corners[index] ?? [0, 0, 0]));
-        for (const ring of rings) addEdges(edges, corners, ring, met);
+      }
+      for (const [from, to] of hull.edges) {
+        const [p, q] = [corners[from], corners[to]];
+        if (p !== undefined && q !== undefined) edges.push(...p, ...q);
       }
     }
     parts.push({ id, kind: object.kind, first, count: triangles.length / 3 - first, firstEdge, edgeCount: edges.length / 3 - firstEdge });
@@ -72,16 +75,20 @@ export function partAt(parts: readonly Part[], vertex: number): Part | null {
   return parts[low] ?? null;
 }
 
-/** Edges of a ring that are not among those that were met before. */
-function addEdges(edges: number[], corners: readonly Triple[], ring: readonly number[], met: Set<string>): void {
-  for (const [n, from] of ring.entries()) {
-    const to = ring[(n + 1) % ring.length] ?? from;
-    const name = from < to ? `${from} ${to}` : `${to} ${from}`;
-    const [p, q] = [corners[from], corners[to]];
-    if (met.has(name) || p === undefined || q === undefined) continue;
-    met.add(name);
-    edges.push(...p, ...q);
+/** The edges between the corners of faces, each once. */
+function edgesOf(faces: readonly (readonly (readonly number[])[])[]): [number, number][] {
+  const met = new Set<string>();
+  const edges: [number, number][] = [];
+  for (const ring of faces.flat()) {
+    for (const [n, from] of ring.entries()) {
+      const to = ring[(n + 1) % ring.length] ?? from;
+      const name = from < to ? `${from} ${to}` : `${to} ${from}`;
+      if (met.has(name)) continue;
+      met.add(name);
+      edges.push([from, to]);
+    }
   }
+  return edges;
 }
 
 /** A wall as the boxes that its doorways leave of it, and what closes its corners. */
@@ -137,22 +144,27 @@ function hullOf(solid: GdbSolid): Hull {
     });
     return drawnUp([ring], lower, upper);
   }
-  return { corners: solid.polyhedron.vertices_m, faces: solid.polyhedron.faces };
+  const { vertices_m: corners, faces } = solid.polyhedron;
+  return { corners, faces, edges: edgesOf(faces) };
 }
 
 function drawnUp(rings: readonly (readonly [number, number][])[], lower: number, upper: number): Hull {
   const corners: Triple[] = [];
   const faces: number[][][] = [];
+  const edges: [number, number][] = [];
   const [floor, ceiling]: [number[][], number[][]] = [[], []];
   for (const ring of rings) {
     const first = corners.length;
     for (const [x, y] of ring) corners.push([x, y, lower], [x, y, upper]);
     const at = (n: number): number => first + 2 * (n % ring.length);
-    for (const n of ring.keys()) faces.push([[at(n), at(n + 1), at(n + 1) + 1, at(n) + 1]]);
+    for (const n of ring.keys()) {
+      faces.push([[at(n), at(n + 1), at(n + 1) + 1, at(n) + 1]]);
+      edges.push([at(n), at(n + 1)], [at(n) + 1, at(n + 1) + 1], [at(n), at(n) + 1]);
+    }
     floor.push([...ring.keys()].map(at).reverse());
     ceiling.push([...ring.keys()].map((n) => at(n) + 1));
   }
-  return { corners, faces: [...faces, floor, ceiling] };
+  return { corners, faces: [...faces, floor, ceiling], edges };
 }
 
 /** The triangles of a plane quadrangle: along the diagonal that has both on the same side of the plane. */
