@@ -187,6 +187,8 @@ document.addEventListener(
     // Who types means the text; only sending is meant from everywhere.
     if (command === null || (field !== null && command !== "send")) return;
     if (command === "type-length") {
+      // Digits mean other things elsewhere.
+      event.stopPropagation();
       document.getElementById("edit-length")?.focus();
       return;
     }

@@ -212,7 +212,7 @@ export function createEditActions({ api, state, dispatch, memory, timers, uuid }
       const { place, editing } = state();
       if (place === null) return;
       if (!editing.is3d && editing.copy === null && !editing.on) void open(place, false);
-      else if (editing.on || !editing.is3d) change({ is3d: !editing.is3d, sketch: NO_EDITING.sketch });
+      else if (editing.on || !editing.is3d) change({ ...finished(editing, { uuid }), tool: "select", is3d: !editing.is3d });
       else {
         reading.abort();
         change({ ...NO_EDITING, making: editing.making });

@@ -91,6 +91,11 @@ export function createEditBar({ parent, store, actions, hand }: EditBarOptions):
           actions.change(wallTyped(editing(), lengthM, degrees, hand));
           length.value = "";
           angle.value = "";
+          // The next key is for the tool again.
+          if (document.activeElement instanceof HTMLElement) document.activeElement.blur();
+        },
+        keydown: (event) => {
+          if (event.key === "Escape" && document.activeElement instanceof HTMLElement) document.activeElement.blur();
         },
       },
     },

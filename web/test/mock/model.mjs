@@ -5,6 +5,9 @@
 /** @typedef {import("../../src/wire").LandmarkTable} LandmarkTable */
 /** @typedef {import("../../src/wire").GdbEntryPage} GdbEntryPage */
 /** @typedef {import("../../src/wire").GdbFindings} GdbFindings */
+/** @typedef {import("../../src/wire").GdbCollection} GdbCollection */
+/** @typedef {import("../../src/wire").GdbEdit} GdbEdit */
+/** @typedef {import("../../src/wire").GdbObject} GdbObject */
 
 /** @param {[number, number][]} corners @param {number} object */
 const ring = (corners, object) => corners.map((at_m) => ({ at_m, object }));
@@ -22,6 +25,8 @@ const TOP_M = 0.7;
 export function createMockModel({ nowMs }) {
   /** @type {GdbEntryPage["entries"]} */
   const entries = [];
+  /** What was drawn on the page. @type {Map<string, GdbObject>} */
+  const objects = new Map();
   /** The draft: the newest edit. */
   const draft = () => entries.find(({ kind }) => kind === "edit")?.revision ?? 0;
 
@@ -34,6 +39,16 @@ export function createMockModel({ nowMs }) {
       };
       entries.unshift(made);
       return made;
+    },
+    /** @returns {GdbCollection} */
+    collection: () => ({ type: "FeatureCollection", revision: draft(), library: 0, features: [...objects].map(([id, properties]) => ({ id, properties })) }),
+    /** Null if it is another draft by now. @param {string} tag @param {GdbEdit} edit */
+    edit(tag, edit) {
+      if (tag !== `"${draft()}.0"`) return null;
+      for (const { id, properties } of edit.put) objects.set(id, properties);
+      for (const id of edit.remove) objects.delete(id);
+      const entry = this.enter("edit");
+      return { draft: entry.draft, library: 0, entry };
     },
     /** What is wrong with the draft. @type {GdbFindings["findings"]} */
     wrong: [],

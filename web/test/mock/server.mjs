@@ -91,6 +91,7 @@ export function createMockServer({ nowMs = Date.now, noSites = false } = {}) {
       return json(noSites ? [] : [{ site: "plant", name: "Demonstration plant", levels: ["ground", "upper"] }]);
     }
     if (path === "/sites/plant/robots") return json(ground.robots());
+    if (path === "/sites/plant/prototypes") return json({ type: "FeatureCollection", revision: 0, features: [] });
 
     const match = /^\/sites\/plant\/levels\/(ground|upper)(\/.*)?$/.exec(path);
     if (match === null) return problem(404, `There is no ${path}.`);
@@ -122,6 +123,15 @@ export function createMockServer({ nowMs = Date.now, noSites = false } = {}) {
       return removed === null ? problem(404, "There is no prior.") : json(removed);
     }
     if (rest === "/imports") return json({ imports: isGround ? prior.imports : [], next: null });
+    if (rest === "/gdb" && request.method === "PATCH") {
+      /** @type {unknown} */
+      const body = JSON.parse(await bodyOf(request));
+      const edit = /** @type {import("../../src/wire").GdbEdit} */ (body);
+      if (url.searchParams.get("preview") === "true") return json({ draft: 0, new: edit.put.length, changed: 0, removed: 0, findings: [], more_findings: false });
+      const answer = model.edit(request.headers["if-match"] ?? "", edit);
+      return answer === null ? problem(412, "The draft has moved on: ada changed 3 objects since.") : json(answer);
+    }
+    if (rest === "/gdb") return json(model.collection());
     if (rest === "/gdb/entries") return json(isGround ? model.entries() : { entries: [], next: null });
     if (rest === "/gdb/findings") return json(model.findings());
     if (rest === "/gdb/publications") {
