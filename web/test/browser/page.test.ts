@@ -318,36 +318,6 @@ describe("the operator", () => {
     expect(complaints).toEqual([]);
   });
 
-  it("draws walls by typed lengths, and keeps them until they are sent", async () => {
-    await open(`${SIGNED_IN}&x=30&y=2&resolution=0.02`);
-    await caughtUp();
-    await page.click("#edit-model");
-    await until("objects", 0);
-    await page.keyboard.press("w");
-    const map = await page.locator("#map").boundingBox();
-    await page.mouse.click((map?.x ?? 0) + (map?.width ?? 0) / 2, (map?.y ?? 0) + (map?.height ?? 0) / 2);
-    await page.waitForSelector("#edit-length", { state: "visible" });
-    for (const [length, angle] of [["3", "0"], ["2,5", "90"]] as const) {
-      await page.keyboard.type(length);
-      await page.waitForSelector("#edit-length:focus");
-      await page.keyboard.press("Tab");
-      await page.keyboard.type(angle);
-      await page.keyboard.press("Enter");
-    }
-    await page.keyboard.press("Enter");
-    await until("unsent", 2);
-    await page.reload();
-    await until("unsent", 2);
-    await page.keyboard.press("Control+s");
-    await page.waitForSelector("text=In the draft: 2 objects");
-    await until("unsent", 0);
-    const { features } = mock.model.collection();
-    const sizes = features.flatMap(({ properties }) => properties.solids?.[0] ?? []).map((solid) => ("box" in solid ? solid.box.to_m : []));
-    expect(sizes.sort()).toEqual([[2.5, 0.05, 2.5], [3, 0.05, 2.5]]);
-    expect(complaints).toEqual([]);
-    expect(strays).toEqual([]);
-  });
-
   it("can do with the keyboard alone", async () => {
     await open(IN_HALL);
     await caughtUp();
