@@ -48,6 +48,8 @@ pub const GDB_FINDINGS: &str = "/api/v1/sites/{site}/levels/{level}/gdb/findings
 pub const GDB_PLAN: &str = "/api/v1/sites/{site}/levels/{level}/gdb/plan";
 /// `POST`: make what is published the prior of the raster.
 pub const GDB_PRIOR: &str = "/api/v1/sites/{site}/levels/{level}/gdb/prior";
+/// `GET`: the GDB in three dimensions, as binary glTF.
+pub const GDB_GLB: &str = "/api/v1/sites/{site}/levels/{level}/gdb.glb";
 /// `GET`: the landmarks that robots find themselves by.
 pub const LANDMARKS: &str = "/api/v1/sites/{site}/levels/{level}/landmarks";
 /// `GET`: what robots found against the GDB.

@@ -6,14 +6,17 @@
 //!
 //! * [`building`]: a building of Open-RMF's traffic editor, in.
 //! * [`dxf`]: drawings, in and out.
+//! * [`glb`]: models in three dimensions, in and out.
 //! * [`incoming`], [`outgoing`]: models of any format on their way in and out.
 //! * [`jsonfg`]: a model with its prototypes, whole, out and in.
 //! * [`layers`]: which layers a raster has, and where they are found.
 //! * [`nav2`]: the raster as `map.yaml` and an image, out and in.
 //! * [`png_tiles`]: the raster as a picture pyramid.
 
+mod affine;
 pub mod building;
 pub mod dxf;
+pub mod glb;
 pub mod incoming;
 pub mod jsonfg;
 pub mod layers;

@@ -194,7 +194,7 @@ export interface paths {
         /**
          * The whole map as a file: `geojson`, or `nav2` (a zip of `map.yaml` and `map.pgm` or `map.png`). Or the a-priori
          *     model: `jsonfg` (all of it, with the prototypes that it uses; `imports` takes it back without loss) or `dxf` (solids as
-         *     outlines with a height or as faces, on a layer for each kind, prototypes as blocks).
+         *     outlines with a height or as faces, on a layer for each kind, prototypes as blocks) or `glb` (in three dimensions, as `gdb.glb`).
          * @description Equal maps give equal bytes. GeoJSON has a `LineString` for each solid part of a segment (with
          *     the feature id `<segment id>#<n>`), a `Polygon` for each cluster and the one or the other for each
          *     chain, in metres of the level; of the model, the outlines (`Polygon`), sheets and openings (`LineString`) that a sensor
@@ -238,6 +238,26 @@ export interface paths {
          *     and `If-Match`. As for `PUT`.
          */
         patch: operations["edit_gdb"];
+        trace?: never;
+    };
+    "/api/v1/sites/{site}/levels/{level}/gdb.glb": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * The a-priori model in three dimensions, as binary glTF: a node for each object, a mesh for each prototype. The same as
+         *     `exports/glb`.
+         */
+        get: operations["read_gdb_glb"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
         trace?: never;
     };
     "/api/v1/sites/{site}/levels/{level}/gdb/entries": {
@@ -374,7 +394,7 @@ export interface paths {
          *     A model as JSON-FG (`application/fg+json`: a `GdbDocument`, as `exports/jsonfg` gives it) goes there too, and its prototypes
          *     into the library of the site, of which no prototype is changed: one whose name is taken gets a name of its own. So does
          *     a drawing (ASCII DXF, `image/vnd.dxf`): walls of pairs of parallel lines, doorways of swings of doors, blocks as
-         *     prototypes. The answer is a `ModelImport`, which tells what was left out, and why.
+         *     prototypes; and a model in three dimensions (GLB, `model/gltf-binary`). The answer is a `ModelImport`, which tells what was left out, and why.
          */
         post: operations["import"];
         /**
@@ -1854,7 +1874,7 @@ export interface components {
          * @description Formats that a model comes in as.
          * @enum {string}
          */
-        ModelFormat: "jsonfg" | "dxf";
+        ModelFormat: "jsonfg" | "dxf" | "glb";
         /** @description The answer to the import of a model: what was found, and what became of it. */
         ModelImport: {
             answer?: components["schemas"]["GdbAnswer"] | null;
@@ -3434,7 +3454,7 @@ export interface operations {
                 bbox?: string;
                 /** @description `geojson`: `map` (what robots saw, the default), `gdb` (the plan of the a-priori model, and its landmarks) or `all`. */
                 of?: "map" | "gdb" | "all";
-                /** @description `jsonfg`, `dxf`, and `geojson` of the model: `draft` (if absent) or `published`. */
+                /** @description `jsonfg`, `dxf`, `glb`, and `geojson` of the model: `draft` (if absent) or `published`. */
                 state?: "draft" | "published";
                 /** @description `geojson` of the model: the height that it is cut at; 0.3 if absent. */
                 height_m?: number;
@@ -3443,7 +3463,7 @@ export interface operations {
             path: {
                 site: string;
                 level: string;
-                /** @description `geojson`, `nav2`, `jsonfg` or `dxf` */
+                /** @description `geojson`, `nav2`, `jsonfg`, `dxf` or `glb` */
                 format: string;
             };
             cookie?: never;
@@ -3460,6 +3480,7 @@ export interface operations {
                     "application/fg+json": components["schemas"]["GdbDocument"];
                     "application/zip": number[];
                     "image/vnd.dxf": number[];
+                    "model/gltf-binary": number[];
                 };
             };
             /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
@@ -3668,6 +3689,48 @@ export interface operations {
                 content: {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_gdb_glb: {
+        parameters: {
+            query?: {
+                /** @description `draft` (if absent) or `published`. */
+                state?: "draft" | "published";
+            };
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The model */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "model/gltf-binary": number[];
+                };
+            };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description Refused; `code` says why */
             default: {

@@ -44,6 +44,8 @@ pub enum ModelFormat {
     Jsonfg,
     /// A drawing (DXF).
     Dxf,
+    /// Binary glTF.
+    Glb,
 }
 
 /// Objects of one kind.

@@ -151,7 +151,8 @@ pub(super) struct ExportCommand {
 #[derive(Debug, Args)]
 pub(super) struct ImportCommand {
     /// The YAML of a `map_server` map, with its image beside it; or a zip of both; or a `*.building.yaml` of Open-RMF; or a
-    /// model as JSON-FG (`*.json`) or a drawing (`*.dxf`)
+    /// model as JSON-FG (`*.json`), a drawing (`*.dxf`) or a model in
+    /// three dimensions (`*.glb`)
     pub(super) file: PathBuf,
     /// Slug of the site
     #[arg(long)]
@@ -256,6 +257,8 @@ pub(super) enum ExportFormat {
     Jsonfg,
     /// The model as a drawing
     Dxf,
+    /// The model in three dimensions, as binary glTF
+    Glb,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

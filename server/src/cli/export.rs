@@ -38,7 +38,8 @@ pub(super) async fn run(
     let newest = level.snapshot().revision();
     let snapshot = level.snapshot_at(newest, PATIENCE).await;
     let of_model = !matches!(command.of, None | Some(ContentName::Map));
-    let is_model = of_model || matches!(command.format, ExportFormat::Jsonfg | ExportFormat::Dxf);
+    let is_model = of_model
+        || matches!(command.format, ExportFormat::Jsonfg | ExportFormat::Dxf | ExportFormat::Glb);
     let written = if is_model {
         export_model::write(&store, &level, &snapshot, command).await
     } else if command.state.is_some() || command.height_m.is_some() {
@@ -54,7 +55,7 @@ pub(super) async fn run(
 
 fn write(snapshot: &Snapshot, command: &ExportCommand) -> Result<ExitCode, CommandError> {
     match command.format {
-        ExportFormat::Jsonfg | ExportFormat::Dxf => {}
+        ExportFormat::Jsonfg | ExportFormat::Dxf | ExportFormat::Glb => {}
         ExportFormat::Geojson if !command.nav2.is_empty() => {
             let words = "geojson takes none of --mode, --image, --layer and --bbox";
             return Err(CommandError::Refused(words.to_owned()));

@@ -10,7 +10,7 @@ use super::import::refused;
 use super::import_building::unreadable;
 use super::{CommandError, say};
 use crate::exchange::outgoing::Outgoing;
-use crate::exchange::{dxf, jsonfg};
+use crate::exchange::{dxf, glb, jsonfg};
 use crate::level::gdb::{GdbModel, HEIGHT_M, read_model};
 use crate::level::{LevelHandle, Snapshot};
 use crate::store::Store;
@@ -37,6 +37,7 @@ pub(super) async fn write(
     let outgoing = outgoing(&model, level);
     match command.format {
         ExportFormat::Jsonfg => to_file(&command.out, |file| jsonfg::write(outgoing, file))?,
+        ExportFormat::Glb => to_file(&command.out, |file| glb::write(outgoing, file))?,
         ExportFormat::Dxf => to_file(&command.out, |file| dxf::write(outgoing, file))?,
         ExportFormat::Geojson | ExportFormat::Nav2 => {
             let height_m = command.height_m.unwrap_or(HEIGHT_M);

@@ -17,7 +17,7 @@ use crate::chance::Chance;
 use crate::clock::{Clock as _, SystemClock};
 use crate::config::Config;
 use crate::exchange::incoming::{FILE_BYTES_MAX, Incoming};
-use crate::exchange::{dxf, jsonfg};
+use crate::exchange::{dxf, glb, jsonfg};
 use crate::level::gdb::{column, read_model};
 use crate::running::{StartError, open_existing_store};
 use crate::store::gdb::{Expected, GdbChange, GdbOutcome, GdbVersion, NewGdbEntry};
@@ -29,6 +29,7 @@ pub(super) fn format_of(path: &Path) -> Option<ModelFormat> {
     match end.as_str() {
         "json" | "jsonfg" | "geojson" => Some(ModelFormat::Jsonfg),
         "dxf" => Some(ModelFormat::Dxf),
+        "glb" => Some(ModelFormat::Glb),
         _ => None,
     }
 }
@@ -47,6 +48,7 @@ pub(super) async fn run(
     let draft = read_model(&store, site, name, state.draft).await.map_err(unreadable)?;
     let read = match format {
         ModelFormat::Jsonfg => jsonfg::read(&bytes, level.frame, draft.library()),
+        ModelFormat::Glb => glb::read(&bytes, level.frame, draft.library()),
         ModelFormat::Dxf => {
             let DrawingOptions { layers, unit_m, wall_height_m } = &command.drawing;
             let options = dxf::Options::new(layers.as_deref(), *unit_m, *wall_height_m);

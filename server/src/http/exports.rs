@@ -69,7 +69,7 @@ pub(super) struct ExportQuery {
     /// `geojson`: `map` (what robots saw, the default), `gdb` (the plan of the a-priori model, and its landmarks) or `all`.
     #[param(inline)]
     of: Option<Shown>,
-    /// `jsonfg`, `dxf`, and `geojson` of the model: `draft` (if absent) or `published`.
+    /// `jsonfg`, `dxf`, `glb`, and `geojson` of the model: `draft` (if absent) or `published`.
     #[param(inline)]
     state: Option<StateName>,
     /// `geojson` of the model: the height that it is cut at; 0.3 if absent.
@@ -124,7 +124,7 @@ enum FormatName {
 
 /// The whole map as a file: `geojson`, or `nav2` (a zip of `map.yaml` and `map.pgm` or `map.png`). Or the a-priori
 /// model: `jsonfg` (all of it, with the prototypes that it uses; `imports` takes it back without loss) or `dxf` (solids as
-/// outlines with a height or as faces, on a layer for each kind, prototypes as blocks).
+/// outlines with a height or as faces, on a layer for each kind, prototypes as blocks) or `glb` (in three dimensions, as `gdb.glb`).
 ///
 /// Equal maps give equal bytes. GeoJSON has a `LineString` for each solid part of a segment (with
 /// the feature id `<segment id>#<n>`), a `Polygon` for each cluster and the one or the other for each
@@ -135,11 +135,11 @@ enum FormatName {
     get, path = route::EXPORTS, operation_id = "export", tag = "map",
     params(
         ("site" = String, Path), ("level" = String, Path),
-        ("format" = String, Path, description = "`geojson`, `nav2`, `jsonfg` or `dxf`"),
+        ("format" = String, Path, description = "`geojson`, `nav2`, `jsonfg`, `dxf` or `glb`"),
         ExportQuery,
     ),
     responses(
-        (status = 200, description = "The file", content((Object = "application/geo+json"), (GdbDocument = "application/fg+json"), (Vec<u8> = "application/zip"), (Vec<u8> = "image/vnd.dxf"))),
+        (status = 200, description = "The file", content((Object = "application/geo+json"), (GdbDocument = "application/fg+json"), (Vec<u8> = "application/zip"), (Vec<u8> = "image/vnd.dxf"), (Vec<u8> = "model/gltf-binary"))),
         (status = 404, description = "`format_not_found`"),
         (status = 409, description = "`map_empty`, `map_too_large`: there is no image of this map, or not of all of it"),
     )
@@ -156,6 +156,7 @@ pub(super) async fn read(
         "nav2" => FormatName::Nav2,
         "jsonfg" => FormatName::Model(Format::Jsonfg),
         "dxf" => FormatName::Model(Format::Dxf),
+        "glb" => FormatName::Model(Format::Glb),
         _ => return Err(ApiError::not_found("format", format)),
     };
     if !query.fits(asked) {

@@ -19,7 +19,7 @@ use super::query::{QueryOf, before, page_limit};
 use super::state::App;
 use crate::auth;
 use crate::exchange::nav2::{Package, Trust};
-use crate::exchange::{dxf, jsonfg};
+use crate::exchange::{dxf, glb, jsonfg};
 use crate::level::gdb::WireLibrary;
 use crate::store::imports::NewImport;
 
@@ -90,7 +90,7 @@ pub(super) struct PageQuery {
 /// A model as JSON-FG (`application/fg+json`: a `GdbDocument`, as `exports/jsonfg` gives it) goes there too, and its prototypes
 /// into the library of the site, of which no prototype is changed: one whose name is taken gets a name of its own. So does
 /// a drawing (ASCII DXF, `image/vnd.dxf`): walls of pairs of parallel lines, doorways of swings of doors, blocks as
-/// prototypes. The answer is a `ModelImport`, which tells what was left out, and why.
+/// prototypes; and a model in three dimensions (GLB, `model/gltf-binary`). The answer is a `ModelImport`, which tells what was left out, and why.
 #[utoipa::path(
     post, path = route::IMPORTS, operation_id = "import", tag = "map",
     params(("site" = String, Path), ("level" = String, Path), ImportQuery),
@@ -130,6 +130,7 @@ pub(super) async fn create(
         let read = move |frame, library: &WireLibrary| match format {
             ModelFormat::Jsonfg => jsonfg::read(&bytes, frame, library),
             ModelFormat::Dxf => dxf::read(&bytes, frame, library, &drawing),
+            ModelFormat::Glb => glb::read(&bytes, frame, library),
         };
         return model_imports::take(&app, &level, taking, &reader, &headers, read).await;
     }

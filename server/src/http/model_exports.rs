@@ -3,8 +3,9 @@
 use std::io;
 use std::sync::Arc;
 
+use axum::extract::State;
 use axum::response::Response;
-use mapfold_schema::{codec, geojson};
+use mapfold_schema::{codec, geojson, route};
 use serde::Deserialize;
 use uuid::Uuid;
 
@@ -12,9 +13,10 @@ use super::access::{LevelFor, Read};
 use super::answer::{Offer, Reader};
 use super::gdb::StateName;
 use super::problem::ApiError;
+use super::query::QueryOf;
 use super::state::App;
 use crate::exchange::outgoing::Outgoing;
-use crate::exchange::{dxf, jsonfg};
+use crate::exchange::{dxf, glb, jsonfg};
 use crate::level::Snapshot;
 use crate::level::gdb::GdbModel;
 
@@ -39,6 +41,7 @@ pub(super) enum Content {
 pub(super) enum Format {
     Jsonfg,
     Dxf,
+    Glb,
 }
 
 impl Format {
@@ -46,6 +49,7 @@ impl Format {
         match self {
             Self::Jsonfg => JSONFG,
             Self::Dxf => &[dxf::MEDIA_TYPE],
+            Self::Glb => &[glb::MEDIA_TYPE],
         }
     }
 
@@ -53,8 +57,36 @@ impl Format {
         match self {
             Self::Jsonfg => "json",
             Self::Dxf => "dxf",
+            Self::Glb => "glb",
         }
     }
+}
+
+/// Which model is asked for.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(super) struct StateQuery {
+    /// `draft` (if absent) or `published`.
+    #[serde(default)]
+    #[param(inline)]
+    state: StateName,
+}
+
+/// The a-priori model in three dimensions, as binary glTF: a node for each object, a mesh for each prototype. The same as
+/// `exports/glb`.
+#[utoipa::path(
+    get, path = route::GDB_GLB, operation_id = "read_gdb_glb", tag = "gdb",
+    params(("site" = String, Path), ("level" = String, Path), StateQuery),
+    responses((status = 200, description = "The model", content((Vec<u8> = "model/gltf-binary"))))
+)]
+pub(super) async fn glb(
+    State(app): State<App>,
+    level: LevelFor<Read>,
+    QueryOf(query): QueryOf<StateQuery>,
+    reader: Reader,
+) -> Result<Response, ApiError> {
+    whole(&app, &level, Format::Glb, query.state, &reader).await
 }
 
 /// A whole model as a file.
@@ -76,6 +108,7 @@ pub(super) async fn whole(
         let written = match format {
             Format::Jsonfg => jsonfg::write(model, &mut bytes),
             Format::Dxf => dxf::write(model, &mut bytes),
+            Format::Glb => glb::write(model, &mut bytes),
         };
         written.map_err(|error| failed(&error))?;
         Ok(bytes)

@@ -17,15 +17,16 @@ use super::problem::gdb::GdbRefusal;
 use super::state::App;
 use crate::auth;
 use crate::exchange::incoming::{FileFault, Incoming};
-use crate::exchange::{dxf, jsonfg};
+use crate::exchange::{dxf, glb, jsonfg};
 use crate::level::gdb::{WireLibrary, column};
 use crate::store::gdb::{Expected, GdbChange, GdbVersion};
 use crate::store::library::LibraryOutcome;
 
 /// What models are sent as.
-const FORMATS: [(&[&str], ModelFormat); 2] = [
+const FORMATS: [(&[&str], ModelFormat); 3] = [
     (&[jsonfg::MEDIA_TYPE, geojson::MEDIA_TYPE, "application/json"], ModelFormat::Jsonfg),
     (&dxf::MEDIA_TYPES, ModelFormat::Dxf),
+    (&[glb::MEDIA_TYPE], ModelFormat::Glb),
 ];
 
 /// The format of a body of this type, if it is a model.

@@ -11,7 +11,8 @@ use super::access::SESSION_COOKIE;
 use super::problem::ApiError;
 use super::{
     batch, changes, contributions, events, exports, gdb, health, imports, landmarks, levels,
-    patches, plan, prototypes, raster, reverts, robots, session, sites, tiles, vector,
+    model_exports, patches, plan, prototypes, raster, reverts, robots, session, sites, tiles,
+    vector,
 };
 
 /// What stands at the head of the description.
@@ -43,7 +44,7 @@ const TAGS_WITH_VALIDATORS: [&str; 6] =
         gdb::read, gdb::replace, gdb::edit, gdb::publish, gdb::entries,
         plan::findings, plan::read, plan::make_prior, landmarks::read,
         changes::read, changes::answer,
-        prototypes::read, prototypes::replace,
+        model_exports::glb, prototypes::read, prototypes::replace,
         session::sign_in, session::describe, session::sign_out,
         health::live, health::ready, health::metrics,
     ),

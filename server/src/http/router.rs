@@ -9,8 +9,8 @@ use super::problem::ApiError;
 use super::state::App;
 use super::{
     batch, changes, contributions, docs, events, exports, gdb, health, imports, landmarks, layers,
-    levels, page, patches, plan, prototypes, raster, reverts, robots, session, sites, tiles,
-    vector,
+    levels, model_exports, page, patches, plan, prototypes, raster, reverts, robots, session,
+    sites, tiles, vector,
 };
 
 /// All routes, with all layers around them.
@@ -61,6 +61,7 @@ pub fn router(app: &App) -> Router {
         .route(route::GDB_PRIOR, post(plan::make_prior))
         .route(route::CHANGES, get(changes::read))
         .route(route::CHANGE, post(changes::answer))
+        .route(route::GDB_GLB, get(model_exports::glb))
         .route(route::LANDMARKS, get(landmarks::read))
         .route(
             route::PROTOTYPES,

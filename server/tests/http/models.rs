@@ -273,6 +273,48 @@ async fn a_model_goes_out_as_a_drawing_and_comes_in_again() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_model_goes_out_in_three_dimensions_and_comes_in_again() {
+    const GLB: &str = "model/gltf-binary";
+    let server = Server::start().await;
+    let here = Level::create(&server.admin()).await;
+    drawn(&here).await;
+    let answer = here.client.get(&here.path(route::GDB_GLB)).await.expect(200);
+    assert_eq!(answer.header("content-type"), GLB);
+    assert_eq!(answer.body, export(&here, "glb").await);
+    let there = Level::create_at(&server.admin(), "other", "hall").await;
+    import(&there, "", GLB, answer.body.clone()).await.expect(201);
+    let again: ModelImport = import(&there, "", GLB, answer.body).await.expect(200).data();
+    assert_eq!(again.answer.unwrap().entry, None);
+    // All of it is there, to the bit: what the objects are, and the prototype that they use.
+    let document = |bytes: &[u8]| -> GdbDocument { serde_json::from_slice(bytes).unwrap() };
+    let (ours, theirs) =
+        (document(&export(&here, "jsonfg").await), document(&export(&there, "jsonfg").await));
+    assert_eq!((ours.features, ours.prototypes), (theirs.features, theirs.prototypes));
+    let published = format!("{}?state=published", here.path(route::GDB_GLB));
+    let empty = here.client.get(&published).await.expect(200).body;
+    let told: ModelImport = import(&there, "?preview=true", GLB, empty).await.expect(200).data();
+    assert_eq!(told.report.kinds, []);
+    let refused = import(&there, "", GLB, b"glTF\x01\0\0\0".to_vec()).await.problem(422);
+    assert!(refused.detail.starts_with("Byte 4: "), "{}", refused.detail);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_wall_with_a_door_out_of_an_ifc_model_is_one() {
+    let server = Server::start().await;
+    let floor = Level::create(&server.admin()).await;
+    let file = include_bytes!("models/simple-wall.glb").to_vec();
+    let made: ModelImport = import(&floor, "", "model/gltf-binary", file).await.expect(201).data();
+    assert_eq!(made.report.kinds.iter().map(|kind| kind.count).collect::<Vec<_>>(), [1, 1]);
+    let findings = floor.client.get(&floor.path(route::GDB_FINDINGS)).await.expect(200);
+    let findings: mapfold_schema::v1::GdbFindings = findings.data();
+    assert_eq!(findings.findings, []);
+    let plan = floor.client.get(&floor.path(route::GDB_PLAN)).await.expect(200);
+    let plan: mapfold_schema::v1::GdbPlan = plan.data();
+    assert_eq!((plan.outlines.len(), plan.openings.len()), (2, 1));
+    assert!((plan.openings[0].width_m - 1.0).abs() < 0.1, "{:?}", plan.openings);
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn what_is_no_model_is_refused_with_its_place_and_changes_nothing() {
     let server = Server::start().await;
     let floor = Level::create(&server.admin()).await;

@@ -3,6 +3,7 @@
 use mapfold_map::gdb::Point3;
 use mapfold_map::geometry::Point;
 
+use super::super::affine::Affine;
 use super::document::{Entity, Insert, Position, Shape};
 use super::tagged;
 
@@ -13,32 +14,7 @@ const ARC_STEP: f64 = std::f64::consts::PI / 18.0;
 /// Corners that bent edges may come to in one path.
 const BENT_MAX: usize = 100_000;
 
-/// `p -> columns * p + offset`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Affine {
-    pub(super) columns: [Point3; 3],
-    pub(super) offset: Point3,
-}
-
 impl Affine {
-    pub(super) fn scaled(by: f64) -> Self {
-        let columns = [Point3::x() * by, Point3::y() * by, Point3::z() * by];
-        Self { columns, offset: Point3::zeros() }
-    }
-
-    pub(super) fn vector(&self, v: &Point3) -> Point3 {
-        self.columns[0] * v.x + self.columns[1] * v.y + self.columns[2] * v.z
-    }
-
-    pub(super) fn point(&self, p: &Point3) -> Point3 {
-        self.vector(p) + self.offset
-    }
-
-    /// First `other`, then this.
-    pub(super) fn after(&self, other: &Self) -> Self {
-        Self { columns: other.columns.map(|c| self.vector(&c)), offset: self.point(&other.offset) }
-    }
-
     /// From the coordinates of objects with this normal (the arbitrary axis algorithm of the format).
     pub(super) fn of_normal(normal: Position) -> Self {
         let z = Point3::from(normal).normalize();

@@ -8,7 +8,8 @@ use mapfold_schema::v1::{
     GdbCylinder, GdbPlacement, GdbPolyhedron, GdbPrism, GdbSolid, ObjectKind,
 };
 
-use super::placing::{Affine, Outline, Piece};
+use super::super::affine::Affine;
+use super::placing::{Outline, Piece};
 
 /// How far what should be a right angle, or a length of 1, may be off.
 const RIGID: f64 = 1e-6;
@@ -152,7 +153,7 @@ pub(super) fn placing(place: &Affine, unit_m: f64, is_ours: bool) -> Option<Plac
     let is_right = x.cross(&y).dot(&z) > 0.0;
     let is_flipped = is(z.z, -1.0) && is(x.z, 0.0);
     if is_unit && is_square && is_right && (is_ours || !is_flipped) {
-        let rotation = Some(quaternion([x, y, z]));
+        let rotation = Some(Affine { columns: [x, y, z], ..*place }.quaternion());
         let placement = GdbPlacement { position_m, rotation };
         return Some(Placing { placement, stretch: Affine::scaled(unit_m), words: String::new() });
     }
@@ -184,21 +185,4 @@ pub(super) fn placing(place: &Affine, unit_m: f64, is_ours: bool) -> Option<Plac
         words.push_str(" mirrored");
     }
     Some(Placing { placement: GdbPlacement { position_m, rotation }, stretch, words })
-}
-
-/// The quaternion of a rotation, `[w, x, y, z]`, from its columns: by the largest of its parts, which is exact enough to
-/// divide by.
-fn quaternion([x, y, z]: [Point3; 3]) -> [f64; 4] {
-    let trace = x.x + y.y + z.z;
-    let parts = if trace >= x.x.max(y.y).max(z.z) {
-        [1.0 + trace, y.z - z.y, z.x - x.z, x.y - y.x]
-    } else if x.x >= y.y.max(z.z) {
-        [y.z - z.y, 1.0 + x.x - y.y - z.z, x.y + y.x, z.x + x.z]
-    } else if y.y >= z.z {
-        [z.x - x.z, x.y + y.x, 1.0 + y.y - x.x - z.z, y.z + z.y]
-    } else {
-        [x.y - y.x, z.x + x.z, y.z + z.y, 1.0 + z.z - x.x - y.y]
-    };
-    let length = parts.iter().map(|part| part * part).sum::<f64>().sqrt();
-    parts.map(|part| part / length)
 }

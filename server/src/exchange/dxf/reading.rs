@@ -5,12 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use mapfold_schema::v1::{GdbPrototype, ModelFormat, ObjectKind};
 use uuid::Uuid;
 
+use super::super::affine::Affine;
 use super::super::incoming::{FileFault, Found, Incoming, object};
 use super::document::{Block, Drawing, Entity, Insert, Shape, unescaped};
 use super::groups::{fault_at, short, text};
 use super::layers::{Content, LayerTable};
 use super::objects::{Laid, Objects};
-use super::placing::{Affine, Piece};
+use super::placing::Piece;
 use super::prototypes::{height_m, placing, solids};
 use super::tagged;
 

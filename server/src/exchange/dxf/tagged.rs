@@ -7,8 +7,9 @@ use mapfold_schema::v1::{Door, DoorKind, GdbObject, GdbPrism, GdbSolid, ObjectKi
 use serde::de::DeserializeOwned;
 use uuid::Uuid;
 
+use super::super::affine::Affine;
 use super::document::{Entity, Tags};
-use super::placing::{Affine, Outline, Piece};
+use super::placing::{Outline, Piece};
 use super::prototypes::{Faces, corners, cylinder};
 
 pub(super) const ID: &str = "id";

@@ -204,7 +204,7 @@ fn hostile_drawings_are_refused_with_the_line() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
 
     /// Whatever is changed in a drawing, it is read or refused with a place.
     #[test]

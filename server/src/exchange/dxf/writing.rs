@@ -12,9 +12,9 @@ use mapfold_map::geometry::Point;
 use mapfold_schema::v1::{GdbObject, ObjectKind};
 use uuid::Uuid;
 
+use super::super::affine::Affine;
 use super::super::outgoing::Outgoing;
 use super::layers::layer_of;
-use super::placing::Affine;
 use super::{APPLICATION, tagged};
 
 /// Letters of one string of extended data.
