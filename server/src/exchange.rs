@@ -22,6 +22,7 @@ pub mod jsonfg;
 pub mod layers;
 pub mod nav2;
 pub mod outgoing;
+mod paired;
 pub mod png_tiles;
 
 #[cfg(test)]

@@ -394,7 +394,7 @@ export interface paths {
          *     A model as JSON-FG (`application/fg+json`: a `GdbDocument`, as `exports/jsonfg` gives it) goes there too, and its prototypes
          *     into the library of the site, of which no prototype is changed: one whose name is taken gets a name of its own. So does
          *     a drawing (ASCII DXF, `image/vnd.dxf`): walls of pairs of parallel lines, doorways of swings of doors, blocks as
-         *     prototypes; and a model in three dimensions (GLB, `model/gltf-binary`). The answer is a `ModelImport`, which tells what was left out, and why.
+         *     prototypes; a map, with `into=gdb`: its occupied cells as walls; and a model in three dimensions (GLB, `model/gltf-binary`). The answer is a `ModelImport`, which tells what was left out, and why.
          */
         post: operations["import"];
         /**
@@ -1874,7 +1874,7 @@ export interface components {
          * @description Formats that a model comes in as.
          * @enum {string}
          */
-        ModelFormat: "jsonfg" | "dxf" | "glb";
+        ModelFormat: "jsonfg" | "dxf" | "glb" | "nav2";
         /** @description The answer to the import of a model: what was found, and what became of it. */
         ModelImport: {
             answer?: components["schemas"]["GdbAnswer"] | null;
@@ -4075,6 +4075,8 @@ export interface operations {
                 building_level?: string;
                 /** @description Of a building or a model, `true`: what is in the draft of the GDB and not in the file goes. */
                 replace?: boolean;
+                /** @description Of a map: what becomes of it: `prior` (if absent), or `gdb`: its occupied cells as walls of the draft. */
+                into?: "prior" | "gdb";
                 /**
                  * @description Of a drawing: which layer is what, before the table of names after AIA and NCS: `PATTERN=KIND,...`, where a star stands
                  *     for any letters, and a kind may be `skip`.

@@ -46,6 +46,8 @@ pub enum ModelFormat {
     Dxf,
     /// Binary glTF.
     Glb,
+    /// A map of `map_server`, drawn as walls.
+    Nav2,
 }
 
 /// Objects of one kind.

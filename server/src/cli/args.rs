@@ -166,6 +166,9 @@ pub(super) struct ImportCommand {
     /// Of a building: which of its levels [default: the only one]
     #[arg(long, value_name = "NAME")]
     pub(super) building_level: Option<String>,
+    /// Of a map: its occupied cells as walls of the model, instead of the prior
+    #[arg(long)]
+    pub(super) into_gdb: bool,
     /// Of a building or a model: take away what is in the draft and not in the file
     #[arg(long)]
     pub(super) replace: bool,

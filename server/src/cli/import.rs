@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use mapfold_schema::v1::ImportReport;
+use mapfold_schema::v1::{ImportReport, ModelFormat};
 
 use super::args::ImportCommand;
 use super::{CommandError, import_building, import_model, say};
@@ -29,7 +29,8 @@ pub(super) async fn run(
     if command.building_level.is_some() {
         return Err(refused("--building-level is of buildings (*.building.yaml) only"));
     }
-    if let Some(format) = import_model::format_of(&command.file) {
+    let map = command.into_gdb.then_some(ModelFormat::Nav2);
+    if let Some(format) = map.or_else(|| import_model::format_of(&command.file)) {
         if command.trust.is_some() {
             return Err(refused("--trust is of map_server's maps only"));
         }
@@ -81,7 +82,7 @@ fn untaken(error: &ImportError) -> CommandError {
 }
 
 /// A zip of the two files, or the YAML with the image that it names beside it.
-fn read(path: &Path) -> Result<Package, CommandError> {
+pub(super) fn read(path: &Path) -> Result<Package, CommandError> {
     let is_zip = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("zip"));
     if is_zip {
         return Package::unzip(&bytes_of(path, IMAGE_BYTES_MAX)?).map_err(|e| untaken(&e));

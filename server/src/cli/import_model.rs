@@ -10,7 +10,7 @@ use mapfold_schema::border::gdb::OBJECTS_MAX;
 use mapfold_schema::v1::{ModelFormat, ModelReport};
 
 use super::args::{DrawingOptions, ImportCommand};
-use super::import::{AUTHOR, bytes_of, refused};
+use super::import::{self, AUTHOR, bytes_of, refused};
 use super::import_building::{TOLD_MAX, unreadable};
 use super::{CommandError, say};
 use crate::chance::Chance;
@@ -49,6 +49,10 @@ pub(super) async fn run(
     let read = match format {
         ModelFormat::Jsonfg => jsonfg::read(&bytes, level.frame, draft.library()),
         ModelFormat::Glb => glb::read(&bytes, level.frame, draft.library()),
+        ModelFormat::Nav2 => {
+            let package = import::read(&command.file)?;
+            package.walls(level.frame, draft.library()).map(|(incoming, _)| incoming)
+        }
         ModelFormat::Dxf => {
             let DrawingOptions { layers, unit_m, wall_height_m } = &command.drawing;
             let options = dxf::Options::new(layers.as_deref(), *unit_m, *wall_height_m);

@@ -4,7 +4,7 @@
 //! * `document`: header, blocks and entities.
 //! * `layers`: which layer is what, by a table that a request may extend.
 //! * `placing`: where entities stand: units, blocks in blocks, coordinate systems of objects.
-//! * `walls`: pairs of parallel lines as walls. `doors`: swings as doorways.
+//! * `doors`: swings as doorways. Walls are of pairs of parallel lines, like those of maps (`paired`).
 //! * `reading`: blocks laid out. `prototypes`: blocks as prototypes. `objects`: what is laid out, as objects.
 //! * `writing`: the other way. `tagged`: what is written beside entities, so that a model comes back as what it was.
 //!
@@ -20,7 +20,6 @@ mod placing;
 mod prototypes;
 mod reading;
 mod tagged;
-mod walls;
 mod writing;
 
 pub use layers::LayerTable;

@@ -18,6 +18,7 @@ mod pgm;
 mod png_image;
 mod prior;
 mod refusal;
+mod walls;
 mod writer;
 
 pub use cells::{Cells, Loaded, UNKNOWN, load};
@@ -26,6 +27,7 @@ pub use image::{Image, ImageFormat, PIXELS_READ_MAX};
 pub use package::{IMAGE_BYTES_MAX, Import, Package};
 pub use prior::{FREE_NAT, OCCUPIED_NAT, Prior, Trust};
 pub use refusal::{ImportError, Warning};
+pub use walls::Explained;
 pub use writer::{Content, Nav2Error, Nav2Map, PIXELS_MAX, Style};
 
 /// Name of the description, where nobody chose another.

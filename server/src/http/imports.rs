@@ -18,7 +18,8 @@ use super::problem::ApiError;
 use super::query::{QueryOf, before, page_limit};
 use super::state::App;
 use crate::auth;
-use crate::exchange::nav2::{Package, Trust};
+use crate::exchange::incoming::FileFault;
+use crate::exchange::nav2::{ImportError, Package, Trust};
 use crate::exchange::{dxf, glb, jsonfg};
 use crate::level::gdb::WireLibrary;
 use crate::store::imports::NewImport;
@@ -26,6 +27,17 @@ use crate::store::imports::NewImport;
 /// Imports of a page, if the request names no number; and at most.
 const PAGE: u32 = 20;
 const PAGE_MAX: u32 = 100;
+
+/// What becomes of a map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, utoipa::ToSchema)]
+#[serde(rename_all = "snake_case")]
+enum Target {
+    /// A layer below what robots saw.
+    #[default]
+    Prior,
+    /// Walls of the a-priori model.
+    Gdb,
+}
 
 /// How a map is taken.
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
@@ -43,6 +55,10 @@ pub(super) struct ImportQuery {
     /// Of a building or a model, `true`: what is in the draft of the GDB and not in the file goes.
     #[serde(default)]
     replace: bool,
+    /// Of a map: what becomes of it: `prior` (if absent), or `gdb`: its occupied cells as walls of the draft.
+    #[serde(default)]
+    #[param(inline)]
+    into: Target,
     /// Of a drawing: which layer is what, before the table of names after AIA and NCS: `PATTERN=KIND,...`, where a star stands
     /// for any letters, and a kind may be `skip`.
     layers: Option<String>,
@@ -90,7 +106,7 @@ pub(super) struct PageQuery {
 /// A model as JSON-FG (`application/fg+json`: a `GdbDocument`, as `exports/jsonfg` gives it) goes there too, and its prototypes
 /// into the library of the site, of which no prototype is changed: one whose name is taken gets a name of its own. So does
 /// a drawing (ASCII DXF, `image/vnd.dxf`): walls of pairs of parallel lines, doorways of swings of doors, blocks as
-/// prototypes; and a model in three dimensions (GLB, `model/gltf-binary`). The answer is a `ModelImport`, which tells what was left out, and why.
+/// prototypes; a map, with `into=gdb`: its occupied cells as walls; and a model in three dimensions (GLB, `model/gltf-binary`). The answer is a `ModelImport`, which tells what was left out, and why.
 #[utoipa::path(
     post, path = route::IMPORTS, operation_id = "import", tag = "map",
     params(("site" = String, Path), ("level" = String, Path), ImportQuery),
@@ -111,7 +127,7 @@ pub(super) async fn create(
     request: Request,
 ) -> Result<Response, ApiError> {
     let drawing = query.drawing()?;
-    let ImportQuery { preview, trust, building_level, replace, .. } = query;
+    let ImportQuery { preview, trust, building_level, replace, into, .. } = query;
     let trust = trust.map_or(Some(Trust::STANDARD), Trust::new);
     let trust = trust.ok_or_else(|| ApiError::Query("`trust` is from 0 to 1.".to_owned()))?;
     let sent = media_type(&headers).unwrap_or_default();
@@ -131,6 +147,20 @@ pub(super) async fn create(
             ModelFormat::Jsonfg => jsonfg::read(&bytes, frame, library),
             ModelFormat::Dxf => dxf::read(&bytes, frame, library, &drawing),
             ModelFormat::Glb => glb::read(&bytes, frame, library),
+            ModelFormat::Nav2 => Err(FileFault::at("the file", "a map comes as a zip")),
+        };
+        return model_imports::take(&app, &level, taking, &reader, &headers, read).await;
+    }
+    if !sent.split(';').next().is_some_and(|essence| essence.trim().eq_ignore_ascii_case(ZIP)) {
+        return Err(ApiError::NotZip);
+    }
+    let bytes: Bytes = body::read(request, app.parts.limits.upload_bytes).await?;
+    if into == Target::Gdb {
+        let taking = model_imports::Taking { preview, replace };
+        let read = move |frame, library: &WireLibrary| {
+            let unread = |error: ImportError| FileFault::at("the map", error.to_string());
+            let package = Package::unzip(&bytes).map_err(unread)?;
+            package.walls(frame, library).map(|(incoming, _)| incoming)
         };
         return model_imports::take(&app, &level, taking, &reader, &headers, read).await;
     }
@@ -138,10 +168,6 @@ pub(super) async fn create(
         let words = "`replace` is of buildings and models.";
         return Err(ApiError::Query(words.to_owned()));
     }
-    if !sent.split(';').next().is_some_and(|essence| essence.trim().eq_ignore_ascii_case(ZIP)) {
-        return Err(ApiError::NotZip);
-    }
-    let bytes: Bytes = body::read(request, app.parts.limits.upload_bytes).await?;
     let _turn = app.exports.acquire().await.ok().ok_or(ApiError::Closing)?;
     let resolution_m = level.level.resolution_m();
     let (id, at_us) = (app.parts.chance.uuid(), app.now_us());

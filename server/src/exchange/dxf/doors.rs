@@ -2,7 +2,7 @@
 
 use mapfold_map::geometry::Point;
 
-use super::walls::Wall;
+use super::super::paired::Wall;
 
 /// Least and greatest angle of a swing, radians.
 const SWING: [f64; 2] = [std::f64::consts::FRAC_PI_6, 2.2];

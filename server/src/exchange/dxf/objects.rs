@@ -7,12 +7,12 @@ use mapfold_schema::v1::{Door, DoorKind, GdbBox, GdbObject, GdbPlacement, GdbSol
 use uuid::Uuid;
 
 use super::super::incoming::{FileFault, Found, object};
+use super::super::paired::{Wall, WallConfig, WallLine, walls};
 use super::document::Tags;
 use super::doors::{Swing, swing};
 use super::placing::{Outline, Piece};
 use super::prototypes::{area, cylinder, height_m, heights, prism};
 use super::tagged::{self, Gathering};
-use super::walls::{Wall, WallConfig, WallLine, walls};
 
 /// Arcs that are looked at as swings of doors.
 const SWINGS_MAX: usize = 5_000;

@@ -18,7 +18,7 @@ use super::tagged;
 /// Blocks within blocks.
 const DEPTH_MAX: usize = 16;
 /// Points once all blocks are laid out.
-const LAID_MAX: usize = 2_000_000;
+const LAID_MAX: usize = 500_000;
 
 /// How a drawing is read.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,4 +1,4 @@
-//! Lines of walls as walls: where two parallel lines face each other at the thickness of a wall, what is between them is one;
+//! Lines of walls, of drawings or the borders of cells, as walls: where two parallel lines face each other at the thickness of a wall, what is between them is one;
 //! what is left over is a thin wall.
 
 use mapfold_map::geometry::Point;
