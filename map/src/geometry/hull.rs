@@ -32,9 +32,14 @@ pub fn convex_hull_into(points: &mut Vec<Point>, hull: &mut Vec<Point>) {
 /// first to the last, in place of what `hull` holds: as [`convex_hull`], without a sort.
 pub fn convex_hull_of_sweep(points: &[Point], hull: &mut Vec<Point>) {
     hull.clear();
-    // Seen from the origin, one chain is the far side and one the near side.
-    half_hull(points.iter(), hull);
-    half_hull(points.iter().rev(), hull);
+    if points.len() < 3 {
+        // A chain leaves out its last point, which is the first of the other one.
+        hull.extend_from_slice(points);
+    } else {
+        // Seen from the origin, one chain is the far side and one the near side.
+        half_hull(points.iter(), hull);
+        half_hull(points.iter().rev(), hull);
+    }
     hull.dedup();
     for p in hull.iter_mut() {
         *p = p.add_scalar(0.0);
