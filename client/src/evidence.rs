@@ -12,7 +12,9 @@ mod canvas;
 mod outline;
 mod scanner;
 mod sonar;
+mod stroke;
 mod walk;
+mod window;
 
 pub use canvas::Canvas;
 pub use scanner::{ScannerEvidenceConfig, beam_evidence, scanner_evidence};

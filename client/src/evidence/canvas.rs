@@ -1,143 +1,165 @@
 //! Where one look's evidence comes together before it becomes a patch.
 
+mod runs;
+
+use std::collections::BTreeMap;
+
 use mapfold_map::raster::{
-    Cell, EvidencePatch, EvidenceRun, LogOdds, SensorClass, TILE_CELLS, TILE_SIDE, TileIndex,
-    TilePatch,
+    Cell, EvidencePatch, LogOdds, SensorClass, TILE_CELLS, TILE_SIDE, TileIndex,
 };
 
-/// Most evidence for "free" that one look may give a cell, millinats: all its beams share one pose
-/// error.
-const FREE_MOST: i32 = -2000;
-/// Most evidence for "occupied" that one look may give a cell, millinats.
-const OCCUPIED_MOST: i32 = 3000;
-/// Millinats of a log-odds step.
-const STEP: i32 = (1000.0 / LogOdds::STEPS_PER_NAT) as i32;
+use super::outline::whole;
+use super::window::{Rows, Window, bits};
+use runs::{Rounding, Runs, Sheet};
 
 /// Grades of free evidence that whole pieces of rows can be laid with.
 pub(super) const GRADES: usize = 4;
 
-/// No sheet has been taken for a place in the window yet.
-const NONE: u32 = u32::MAX;
+/// Tiles in the largest window: at cells of 5 cm, 800 m by 800 m.
+const WINDOW_MOST: i64 = 1 << 16;
 
-/// Tiles along each side of the largest window: at cells of 5 cm, 13 km.
-const WINDOW_MOST: i32 = 4096;
-
-/// A tile under way. A row of cells is a word of bits.
-#[derive(Debug)]
-struct Sheet {
-    index: TileIndex,
-    /// The rows on which anything is.
-    rows: u64,
-    /// Row by row, the cells that were laid free, grade by grade; the highest counts.
-    free: [[u64; GRADES]; TILE_SIDE],
-    /// Row by row, the cells that have a value of their own, whatever was laid.
-    marked: [u64; TILE_SIDE],
-    /// Those values, millinats.
-    values: Box<[i16; TILE_CELLS]>,
-}
+/// In what is noted of a tile, besides a bit for each grade that was laid: some cells have a value of their
+/// own.
+const MARKED: u8 = 1 << GRADES;
 
 /// Evidence on a window of tiles. Reused from look to look, it allocates nothing once warm, the patch
 /// that it gives away aside.
 ///
-/// Cells are named by column and row in the window, from its lower left corner.
+/// Cells are named by column and row in the window, from its lower left corner. A row of a tile's cells is
+/// a word of bits. All is kept tile by tile and is clean between looks.
 #[derive(Debug, Default)]
 pub struct Canvas {
     corner: Option<TileIndex>,
-    tiles_wide: usize,
-    /// Tile by tile of the window, the sheet that stands for it.
-    places: Vec<u32>,
-    /// Those in use first.
-    sheets: Vec<Sheet>,
-    used: usize,
-    runs: Vec<EvidenceRun>,
-    order: Vec<(TileIndex, u32)>,
+    window: Window,
+    /// What there is on a tile: grades and marks.
+    noted: Vec<u8>,
+    /// Grade by grade, the cells that were laid free; the highest counts.
+    free: Vec<[Rows; GRADES]>,
+    /// The cells that have a value of their own, whatever was laid.
+    marked: Vec<u64>,
+    /// Those values, millinats.
+    values: Vec<i32>,
+    runs: Runs,
     pub(super) fan: super::scanner::Fan,
+    pub(super) bumps: super::scanner::Bumps,
     pub(super) outline: super::outline::Outline,
 }
 
-impl Sheet {
-    fn blank(index: TileIndex) -> Self {
-        Self {
-            index,
-            rows: 0,
-            free: [[0; GRADES]; TILE_SIDE],
-            marked: [0; TILE_SIDE],
-            values: Box::new([0; TILE_CELLS]),
+/// Where values of single cells are added.
+pub(super) struct Marks<'a> {
+    window: Window,
+    noted: &'a mut [u8],
+    marked: &'a mut [u64],
+    values: &'a mut [i32],
+}
+
+impl Marks<'_> {
+    /// Adds to the value of a cell of its own, millinats; what was laid there counts no more.
+    #[inline]
+    pub(super) fn add(&mut self, column: i32, row: i32, value: i32) {
+        let Some(word) = self.window.word(column, row) else { return };
+        self.noted[word / TILE_SIDE] |= MARKED;
+        self.marked[word] |= 1 << (column as usize % TILE_SIDE);
+        self.values[word * TILE_SIDE + column as usize % TILE_SIDE] += value;
+    }
+
+    /// Adds to the values of the cells that hold places in a row, a `step` of at most a cell apart, `side`
+    /// of them before the middle one and as many behind it; places and steps are numbers with bits
+    /// behind the point ([`fixed`](super::outline::fixed)).
+    #[inline]
+    pub(super) fn add_along(
+        &mut self,
+        [middle_x, middle_y]: [i64; 2],
+        [step_x, step_y]: [i64; 2],
+        side: u32,
+        added: impl Iterator<Item = i32>,
+    ) {
+        let back = i64::from(side);
+        let (mut x, mut y) = (middle_x - back * step_x, middle_y - back * step_y);
+        let (column, row) = (whole(middle_x), whole(middle_y));
+        let Some(word) = self.window.word(column, row) else { return };
+        let tile = word / TILE_SIDE;
+        // Mostly all in one tile: where its border is farther away than they reach.
+        let reach = side + 1;
+        let inner = (TILE_SIDE as u32).saturating_sub(2 * reach);
+        let is_inner = |v: i32| (v as u32 % TILE_SIDE as u32).wrapping_sub(reach) < inner;
+        if is_inner(column)
+            && is_inner(row)
+            && let Some(noted) = self.noted.get_mut(tile)
+            && let Some(marked) = self.marked.as_chunks_mut::<TILE_SIDE>().0.get_mut(tile)
+            && let Some(values) = self.values.as_chunks_mut::<TILE_CELLS>().0.get_mut(tile)
+        {
+            *noted |= MARKED;
+            for value in added {
+                let (column, row) = (whole(x) as usize % TILE_SIDE, whole(y) as usize % TILE_SIDE);
+                marked[row] |= 1 << column;
+                values[row * TILE_SIDE + column] += value;
+                (x, y) = (x + step_x, y + step_y);
+            }
+        } else {
+            for value in added {
+                self.add(whole(x), whole(y), value);
+                (x, y) = (x + step_x, y + step_y);
+            }
         }
     }
 }
 
 impl Canvas {
     /// Begins a look that marks no cell outside of `low` to `high`; answers the cell in the window's
-    /// corner and the window's height in cells. `None` if that is larger than anything that a
-    /// sensor sees.
-    pub(super) fn begin(&mut self, low: Cell, high: Cell) -> Option<(Cell, usize)> {
+    /// corner and the window. `None` if that is larger than anything that a sensor sees.
+    pub(super) fn begin(&mut self, low: Cell, high: Cell) -> Option<(Cell, Window)> {
         let (first, last) = (low.tile().0, high.tile().0);
-        let wide = last.x.checked_sub(first.x)?;
-        let high = last.y.checked_sub(first.y)?;
-        if !(0..WINDOW_MOST).contains(&wide) || !(0..WINDOW_MOST).contains(&high) {
+        let wide = i64::from(last.x) - i64::from(first.x) + 1;
+        let high = i64::from(last.y) - i64::from(first.y) + 1;
+        if wide < 1 || high < 1 || wide.checked_mul(high)? > WINDOW_MOST {
             return None;
         }
         self.corner = Some(first);
-        self.tiles_wide = wide as usize + 1;
-        let tiles_high = high as usize + 1;
-        self.places.clear();
-        self.places.resize(self.tiles_wide * tiles_high, NONE);
-        Some((first.cell(0), tiles_high * TILE_SIDE))
+        self.window = Window { tiles_wide: wide as usize, tiles_high: high as usize };
+        let tiles = self.window.tiles();
+        if self.noted.len() < tiles {
+            // All is clean, so that nothing has to be kept.
+            self.noted = vec![0; tiles];
+            self.free = vec![[[0; TILE_SIDE]; GRADES]; tiles];
+            self.marked = vec![0; tiles * TILE_SIDE];
+            self.values = vec![0; tiles * TILE_CELLS];
+        }
+        Some((first.cell(0), self.window))
     }
 
-    /// The sheet under a tile of the window; `None` outside of it.
+    /// Where to lay a grade of "free" on the cells of a tile, by its column and row among the window's.
     #[inline]
-    fn sheet(&mut self, x: usize, y: usize) -> Option<&mut Sheet> {
-        if x >= self.tiles_wide {
-            return None;
-        }
-        let place = self.places.get_mut(y * self.tiles_wide + x)?;
-        if *place == NONE {
-            *place = self.used as u32;
-            let corner = self.corner?;
-            let index = TileIndex { x: corner.x + x as i32, y: corner.y + y as i32 };
-            match self.sheets.get_mut(self.used) {
-                Some(sheet) => sheet.index = index,
-                None => self.sheets.push(Sheet::blank(index)),
-            }
-            self.used += 1;
-        }
-        self.sheets.get_mut(*place as usize)
+    pub(super) fn free(&mut self, x: usize, y: usize, grade: usize) -> Option<&mut Rows> {
+        let tile = y * self.window.tiles_wide + x;
+        *self.noted.get_mut(tile)? |= 1 << (grade % GRADES);
+        Some(&mut self.free.get_mut(tile)?[grade % GRADES])
     }
 
     /// Lays a grade of "free" on the cells `from` to `to` (not included) of a row.
+    #[inline]
     pub(super) fn lay(&mut self, row: i32, from: i32, to: i32, grade: usize) {
-        let (row, from, to) = (row as usize, from as usize, to as usize);
-        if from >= to {
-            return;
-        }
-        let (first, last) = (from / TILE_SIDE, (to - 1) / TILE_SIDE);
-        let at = row % TILE_SIDE;
-        for x in first..=last {
-            let Some(sheet) = self.sheet(x, row / TILE_SIDE) else { return };
-            let mut cells = u64::MAX;
-            if x == first {
-                cells &= u64::MAX << (from % TILE_SIDE);
-            }
-            if x == last {
-                cells &= u64::MAX >> (TILE_SIDE - 1 - (to - 1) % TILE_SIDE);
-            }
-            sheet.rows |= 1 << at;
-            sheet.free[at][grade % GRADES] |= cells;
+        let to = to.min(self.window.columns());
+        let mut from = from.max(0);
+        while from < to {
+            let Some(word) = self.window.word(from, row) else { return };
+            let until = to.min((from | (TILE_SIDE as i32 - 1)) + 1);
+            let grade = grade % GRADES;
+            self.noted[word / TILE_SIDE] |= 1 << grade;
+            self.free[word / TILE_SIDE][grade][word % TILE_SIDE] |=
+                bits(from as u32 % 64, (until - 1) as u32 % 64 + 1);
+            from = until;
         }
     }
 
-    /// Adds to the value of a cell of its own, millinats; what was laid there counts no more.
-    #[inline]
-    pub(super) fn add(&mut self, column: i32, row: i32, value: i16) {
-        let (column, row) = (column as usize, row as usize);
-        let Some(sheet) = self.sheet(column / TILE_SIDE, row / TILE_SIDE) else { return };
-        let (column, row) = (column % TILE_SIDE, row % TILE_SIDE);
-        sheet.rows |= 1 << row;
-        sheet.marked[row] |= 1 << column;
-        let cell = &mut sheet.values[row * TILE_SIDE + column];
-        *cell = cell.saturating_add(value);
+    /// To mark single cells.
+    pub(super) fn marks(&mut self) -> Marks<'_> {
+        Marks {
+            window: self.window,
+            noted: &mut self.noted,
+            marked: &mut self.marked,
+            values: &mut self.values,
+        }
     }
 
     /// Takes the evidence out as a patch, capped and rounded to `step` (a multiple of the log-odds
@@ -148,100 +170,39 @@ impl Canvas {
         step: LogOdds,
         grades: [i16; GRADES],
     ) -> EvidencePatch {
-        let sheets = &mut self.sheets[..self.used];
-        self.order.clear();
-        self.order.extend(sheets.iter().zip(0..).map(|(sheet, at)| (sheet.index, at)));
-        self.order.sort_unstable();
         let rounding = Rounding::to(step);
-        let grades = grades.map(|grade| rounding.of(grade));
-        let runs = &mut self.runs;
-        let tiles = self.order.iter().filter_map(|(index, at)| {
-            runs.clear();
-            take_runs(&mut sheets[*at as usize], grades, &rounding, runs);
-            // Runs in the order of the cells are a patch; without any, the tile does not belong there.
-            let patch = TilePatch::new(runs.clone()).ok()?;
-            (!runs.is_empty()).then_some((*index, patch))
-        });
-        let tiles = tiles.collect();
-        self.used = 0;
-        self.corner = None;
-        EvidencePatch { class, tiles }
-    }
-}
-
-/// Takes a sheet's cells out as runs, and leaves it clean.
-fn take_runs(
-    sheet: &mut Sheet,
-    grades: [i16; GRADES],
-    rounding: &Rounding,
-    runs: &mut Vec<EvidenceRun>,
-) {
-    let mut rows = std::mem::take(&mut sheet.rows);
-    while rows != 0 {
-        let row = rows.trailing_zeros() as usize;
-        rows &= rows - 1;
-        let start = row * TILE_SIDE;
-        let marked = std::mem::take(&mut sheet.marked[row]);
-        // Of each grade, what no higher one and no mark hides.
-        let mut free = std::mem::take(&mut sheet.free[row]);
-        let mut hidden = marked;
-        for cells in free.iter_mut().rev() {
-            *cells &= !hidden;
-            hidden |= *cells;
-        }
-        let mut left = hidden;
-        while left != 0 {
-            let at = left.trailing_zeros();
-            let (value, length) = if marked >> at & 1 == 1 {
-                let value = std::mem::take(&mut sheet.values[start + at as usize]);
-                (rounding.of(value), 1)
-            } else {
-                let laid = free.iter().zip(&grades).find(|(cells, _)| **cells >> at & 1 == 1);
-                laid.map_or((0, 1), |(cells, value)| (*value, (cells >> at).trailing_ones()))
-            };
-            if value != 0 {
-                push(runs, start + at as usize, length as usize, value);
+        let grades = grades.map(|grade| rounding.of(i32::from(grade)));
+        let mut tiles = BTreeMap::new();
+        let Some(corner) = self.corner.take() else { return EvidencePatch { class, tiles } };
+        let window = self.window;
+        // In the order of the tiles' indices.
+        for x in 0..window.tiles_wide {
+            for y in 0..window.tiles_high {
+                let tile = y * window.tiles_wide + x;
+                let noted = std::mem::take(&mut self.noted[tile]);
+                if noted == 0 {
+                    continue;
+                }
+                let sheet = Sheet {
+                    noted,
+                    free: &mut self.free[tile],
+                    marked: &mut self.marked.as_chunks_mut().0[tile],
+                    values: &mut self.values.as_chunks_mut().0[tile],
+                };
+                if let Some(patch) = self.runs.take(sheet, grades, rounding) {
+                    let index = TileIndex { x: corner.x + x as i32, y: corner.y + y as i32 };
+                    tiles.insert(index, patch);
+                }
             }
-            let Some(behind) = u64::MAX.checked_shl(at + length) else { break };
-            left &= behind;
         }
-    }
-}
-
-/// How millinats become log-odds steps.
-struct Rounding {
-    /// Millinats.
-    half_unit: i32,
-    /// In 2^-22.
-    units_per_millinat: i32,
-    steps_per_unit: i32,
-}
-
-impl Rounding {
-    fn to(step: LogOdds) -> Self {
-        let unit = step.0.max(1) * STEP;
-        // A little too much, so that whole units stay whole.
-        let units_per_millinat = (1 << 22) / unit + 1;
-        Self { half_unit: unit / 2, units_per_millinat, steps_per_unit: step.0 }
-    }
-
-    /// Capped, and rounded to the nearest unit.
-    fn of(&self, value: i16) -> i16 {
-        let value = i32::from(value).clamp(FREE_MOST, OCCUPIED_MOST);
-        let units = ((value.abs() + self.half_unit) as u32 * self.units_per_millinat as u32) >> 22;
-        (value.signum() * units as i32 * self.steps_per_unit) as i16
-    }
-}
-
-fn push(runs: &mut Vec<EvidenceRun>, start: usize, length: usize, value: i16) {
-    match runs.last_mut() {
-        Some(run) if run.value == value && run.range().end == start => run.length += length as u16,
-        _ => runs.push(EvidenceRun { start: start as u16, length: length as u16, value }),
+        EvidencePatch { class, tiles }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use mapfold_map::raster::TilePatch;
+
     use super::*;
 
     const GRADED: [i16; GRADES] = [-100, -200, -300, -400];
@@ -249,7 +210,10 @@ mod tests {
     fn canvas() -> Canvas {
         let mut canvas = Canvas::default();
         let cell = |column, row| Cell { column, row };
-        assert_eq!(canvas.begin(cell(-5, 3), cell(70, 20)), Some((cell(-64, 0), 64)));
+        assert_eq!(
+            canvas.begin(cell(-5, 3), cell(70, 20)),
+            Some((cell(-64, 0), Window { tiles_wide: 3, tiles_high: 1 }))
+        );
         canvas
     }
 
@@ -265,9 +229,9 @@ mod tests {
     fn a_mark_outdoes_what_is_laid_and_the_higher_grade_the_lower() {
         let mut canvas = canvas();
         canvas.lay(0, 64, 74, 3);
-        canvas.add(67, 0, 500);
+        canvas.marks().add(67, 0, 500);
         canvas.lay(0, 64, 76, 0);
-        canvas.add(67, 0, 250);
+        canvas.marks().add(67, 0, 250);
         assert_eq!(
             painted(&mut canvas, 1),
             [(0, 0, 3, -40), (0, 3, 1, 75), (0, 4, 6, -40), (0, 10, 2, -10)]
@@ -279,8 +243,8 @@ mod tests {
     fn one_look_cannot_say_more_than_its_cap() {
         let mut canvas = canvas();
         for _ in 0..100 {
-            canvas.add(65, 0, 850);
-            canvas.add(73, 0, -400);
+            canvas.marks().add(65, 0, 850);
+            canvas.marks().add(73, 0, -400);
         }
         assert_eq!(painted(&mut canvas, 10), [(0, 1, 1, 300), (0, 9, 1, -200)]);
     }
@@ -292,8 +256,8 @@ mod tests {
         canvas.lay(6, 64, 66, 3);
         canvas.lay(6, 190, 300, 2);
         canvas.lay(64, 0, 9, 2);
-        canvas.add(-1, 3, 900);
-        canvas.add(192, 3, 900);
+        canvas.marks().add(-1, 3, 900);
+        canvas.marks().add(192, 3, 900);
         let row = 5 * 64;
         assert_eq!(
             painted(&mut canvas, 10),
@@ -303,27 +267,11 @@ mod tests {
     }
 
     #[test]
-    fn evidence_is_rounded_to_the_nearest_step() {
-        let of = |value| Rounding::to(LogOdds(10)).of(value);
-        let rounded = [-400, -351, -349, -51, -49, 49, 51, 849, 851].map(of);
-        assert_eq!(rounded, [-40, -40, -30, -10, 0, 0, 10, 80, 90]);
-        for step in [1, 2, 5, 7, 10, 50] {
-            let rounding = Rounding::to(LogOdds(step));
-            for value in -2500..3500_i16 {
-                let capped = f64::from(value).clamp(-2000.0, 3000.0);
-                let units = (capped / f64::from(10 * step)).round() as i32;
-                assert_eq!(i32::from(rounding.of(value)), units * step, "{step} {value}");
-            }
-        }
-        assert_eq!([-4, -6, 4, 6].map(|v| Rounding::to(LogOdds(1)).of(v)), [0, -1, 0, 1]);
-    }
-
-    #[test]
     fn a_window_that_no_sensor_sees_is_refused() {
         let mut canvas = Canvas::default();
         let far = Cell { column: i32::MAX, row: 0 };
         assert_eq!(canvas.begin(Cell { column: i32::MIN, row: 0 }, far), None);
-        canvas.add(0, 0, 900);
+        canvas.marks().add(0, 0, 900);
         assert!(painted(&mut canvas, 1).is_empty());
     }
 }

@@ -1,31 +1,34 @@
-//! The cells inside of an outline, row by row.
+//! The cells inside of an outline, 64 at a time.
 //!
 //! Works in a window's own coordinates: the centre of the cell in column 3 and row 5 is the point
 //! (3, 5). Knows nothing of beams.
 
 use mapfold_map::geometry::Point;
+use mapfold_map::raster::TILE_SIDE;
+
+use super::window::{Rows, Window, each_run};
 
 /// An outline of straight edges, in any order; a cell is inside if its centre is.
 ///
 /// An edge counts for the rows whose centre lines it crosses, its lower end included, its upper end not: so
 /// edges that share their ends cross every row an even number of times, whatever the rounding, and
 /// an edge that is laid twice takes itself away.
+///
+/// Each crossing turns one bit, that of the first cell behind it; a cell is inside if the number of bits
+/// up to it in its row is odd, which is found out for 64 cells at a time.
 #[derive(Debug, Default)]
 pub(super) struct Outline {
-    /// Row and column of the first cell behind each crossing.
-    crossings: Vec<(u32, i32)>,
-    /// Row by row, where its crossings begin in `columns`.
-    starts: Vec<u32>,
-    columns: Vec<i32>,
-    rows: usize,
+    window: Window,
+    /// The turned bits of the window, row by row of each tile. None is left when the outline has been visited.
+    turned: Vec<u64>,
+    /// Tile by tile, whether any bit was turned.
+    is_turned: Vec<bool>,
+    /// The first row that an edge crosses, and the one behind the last.
+    rows: [i32; 2],
 }
 
 /// Bits behind the point of the numbers in which edges are followed.
 const POINT: u32 = 20;
-const ONE: f64 = (1_u64 << POINT) as f64;
-
-/// A corner of an outline, with so many bits behind the point.
-pub(super) type Corner = [i64; 2];
 
 /// A number with bits behind the point, for numbers up to 2^30. Adding this much leaves the lowest bit of
 /// a double just there, and is quicker than asking for a whole number.
@@ -39,92 +42,114 @@ pub(super) fn whole(v: i64) -> i32 {
     (v >> POINT) as i32
 }
 
-/// A point as a corner.
-pub(super) fn corner(p: &Point) -> Corner {
-    [fixed(p.x), fixed(p.y)]
+/// A corner of an outline.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Corner {
+    x: f64,
+    y: f64,
+    /// The first row whose centre is not below.
+    row: i32,
 }
 
-/// The first row whose centre is not below.
-fn row(y: i64) -> i32 {
-    whole(y + (1 << POINT) - 1)
+/// A point as a corner.
+pub(super) fn corner(p: &Point) -> Corner {
+    Corner { x: p.x, y: p.y, row: whole(fixed(p.y) + (1 << POINT) - 1) }
 }
 
 impl Outline {
-    /// Begins an outline in a window of so many rows.
-    pub(super) fn begin(&mut self, rows: usize) {
-        self.rows = rows;
-        self.crossings.clear();
-        self.starts.clear();
-        self.starts.resize(rows + 1, 0);
+    /// Begins an outline in a window.
+    pub(super) fn begin(&mut self, window: Window) {
+        let words = window.tiles() * TILE_SIDE;
+        if self.turned.len() < words {
+            self.turned.resize(words, 0);
+            self.is_turned.resize(window.tiles(), false);
+        }
+        self.rows = [window.rows(), 0];
+        self.window = window;
     }
 
     /// Lays an edge.
+    #[inline]
     pub(super) fn edge(&mut self, a: Corner, b: Corner) {
-        let (low, high) = if a[1] <= b[1] { (a, b) } else { (b, a) };
-        let (from, to) = (row(low[1]).max(0), row(high[1]).min(self.rows as i32));
+        if a.row != b.row {
+            self.turn(a, b);
+        }
+    }
+
+    /// Turns the bits behind an edge.
+    #[inline(never)]
+    fn turn(&mut self, a: Corner, b: Corner) {
+        let (low, high) = if a.row <= b.row { (a, b) } else { (b, a) };
+        let (from, to) = (low.row.max(0), high.row.min(self.window.rows()));
         if from >= to {
             return;
         }
-        let slope = (high[0] - low[0]) as f64 / (high[1] - low[1]) as f64;
-        let first = ((i64::from(from) << POINT) - low[1]) as f64 * slope;
-        let (mut x, step) = (low[0] + first as i64, (slope * ONE) as i64);
+        self.rows = [self.rows[0].min(from), self.rows[1].max(to)];
+        let slope = (high.x - low.x) / (high.y - low.y);
+        let mut x = fixed(low.x + (f64::from(from) - low.y) * slope).wrapping_add((1 << POINT) - 1);
+        let step = fixed(slope);
         for row in from..to {
-            // Rounding over the longest window: a hundredth of a cell.
-            let column = whole(x.wrapping_add((1 << POINT) - 1));
-            self.crossings.push((row as u32, column.max(0)));
-            self.starts[row as usize + 1] += 1;
+            // Rounding over a window of a thousand rows: a thousandth of a cell.
+            let column = whole(x).max(0);
+            // What lies to the right of the window ends no row in it.
+            if let Some(word) = self.window.word(column, row) {
+                self.is_turned[word / TILE_SIDE] = true;
+                self.turned[word] ^= 1 << (column as usize % TILE_SIDE);
+            }
             x = x.wrapping_add(step);
         }
     }
 
-    /// Visits the pieces of rows inside: row, first column, column behind the last.
-    pub(super) fn rows(&mut self, mut visit: impl FnMut(i32, i32, i32)) {
-        let mut sum = 0;
-        for start in &mut self.starts {
-            sum += *start;
-            *start = sum;
-        }
-        self.columns.clear();
-        self.columns.resize(self.crossings.len(), 0);
-        // Every row's start moves on to its end, which is the next row's start.
-        for (row, column) in &self.crossings {
-            let end = &mut self.starts[*row as usize];
-            self.columns[*end as usize] = *column;
-            *end += 1;
-        }
-        let mut from = 0;
-        for (row, to) in self.starts[..self.rows].iter().enumerate() {
-            let columns = &mut self.columns[from as usize..*to as usize];
-            sort(columns);
-            for pair in columns.as_chunks::<2>().0 {
-                if pair[0] < pair[1] {
-                    visit(row as i32, pair[0], pair[1]);
+    /// Visits the tiles of the window that hold any cell inside, with their column and row among the
+    /// window's tiles. Nothing is left of the outline.
+    pub(super) fn tiles(&mut self, mut visit: impl FnMut(usize, usize, &Rows)) {
+        let [from, to] = self.rows.map(|row| row.max(0) as usize);
+        let wide = self.window.tiles_wide;
+        for y in from / TILE_SIDE..to.div_ceil(TILE_SIDE) {
+            // Whether what ends a tile's rows to the left is inside: all bits or none.
+            let mut inside = [0_u64; TILE_SIDE];
+            let mut ends_inside = false;
+            let tiles = self.turned.as_chunks_mut().0[y * wide..][..wide].iter_mut();
+            let is_turned = self.is_turned[y * wide..][..wide].iter_mut();
+            for (x, (tile, is_turned)) in tiles.zip(is_turned).enumerate() {
+                if !std::mem::take(is_turned) {
+                    if ends_inside {
+                        visit(x, y, &inside);
+                    }
+                    continue;
+                }
+                let (mut any, mut last) = (0, 0);
+                for (cells, inside) in tile.iter_mut().zip(&mut inside) {
+                    let mut odd = *cells;
+                    for shift in [1, 2, 4, 8, 16, 32] {
+                        odd ^= odd << shift;
+                    }
+                    odd ^= *inside;
+                    *inside = (odd.cast_signed() >> 63).cast_unsigned();
+                    *cells = odd;
+                    any |= odd;
+                    last |= *inside;
+                }
+                ends_inside = last != 0;
+                if any != 0 {
+                    visit(x, y, tile);
+                    *tile = [0; TILE_SIDE];
                 }
             }
-            from = *to;
         }
     }
-}
 
-/// Sorts a few numbers.
-fn sort(columns: &mut [i32]) {
-    if columns.len() == 2 {
-        // By far the most.
-        if columns[0] > columns[1] {
-            columns.swap(0, 1);
-        }
-        return;
-    }
-    if columns.len() > 16 {
-        columns.sort_unstable();
-        return;
-    }
-    for at in 1..columns.len() {
-        let mut at = at;
-        while at > 0 && columns[at - 1] > columns[at] {
-            columns.swap(at - 1, at);
-            at -= 1;
-        }
+    /// Visits the pieces of rows inside, tile by tile: row, first column, column behind the last.
+    /// Nothing is left of the outline.
+    pub(super) fn pieces(&mut self, mut visit: impl FnMut(i32, i32, i32)) {
+        self.tiles(|x, y, rows| {
+            for (row, cells) in rows.iter().enumerate() {
+                each_run(*cells, |from, to| {
+                    let column = |at: u32| (x * TILE_SIDE) as i32 + at as i32;
+                    visit((y * TILE_SIDE + row) as i32, column(from), column(to));
+                });
+            }
+        });
     }
 }
 
@@ -135,14 +160,16 @@ mod tests {
 
     use super::*;
 
-    fn inside(corners: &[Point], rows: usize) -> Vec<(i32, i32)> {
+    fn inside(corners: &[Point]) -> Vec<(i32, i32)> {
         let mut outline = Outline::default();
-        outline.begin(rows);
+        outline.begin(Window { tiles_wide: 2, tiles_high: 2 });
         for (at, corner) in corners.iter().enumerate() {
             outline.edge(super::corner(corner), super::corner(&corners[(at + 1) % corners.len()]));
         }
         let mut cells = Vec::new();
-        outline.rows(|row, from, to| cells.extend((from..to).map(|column| (column, row))));
+        outline.pieces(|row, from, to| cells.extend((from..to).map(|column| (row, column))));
+        assert!(outline.turned.iter().all(|row| *row == 0), "something is left");
+        cells.sort_unstable();
         cells
     }
 
@@ -150,14 +177,13 @@ mod tests {
     fn a_square_holds_the_centres_in_it() {
         let corners =
             [(1.2, 0.9), (4.0, 0.9), (4.0, 3.0), (1.2, 3.0)].map(|(x, y)| Point::new(x, y));
-        let cells = [(2, 1), (3, 1), (2, 2), (3, 2)];
-        assert_eq!(inside(&corners, 9), cells);
+        assert_eq!(inside(&corners), [(1, 2), (1, 3), (2, 2), (2, 3)]);
     }
 
     proptest! {
         #[test]
         fn a_star_holds_the_centres_that_its_rays_pass(
-            ranges in vec(0.5..30.0f64, 3..60), x in 31.0..33.0f64, y in 31.0..33.0f64,
+            ranges in vec(0.5..30.0f64, 3..60), x in 31.0..90.0f64, y in 31.0..90.0f64,
         ) {
             let step = std::f64::consts::TAU / ranges.len() as f64;
             let corner = |at: usize| {
@@ -165,9 +191,9 @@ mod tests {
                 Point::new(x + ranges[at % ranges.len()] * cos, y + ranges[at % ranges.len()] * sin)
             };
             let corners: Vec<Point> = (0..ranges.len()).map(corner).collect();
-            let cells = inside(&corners, 64);
-            for row in 0..64 {
-                for column in 0..64 {
+            let cells = inside(&corners);
+            for row in 0..128 {
+                for column in 0..128 {
                     let p = Point::new(f64::from(column) - x, f64::from(row) - y);
                     let at = (p.y.atan2(p.x).rem_euclid(std::f64::consts::TAU) / step) as usize;
                     let at = at.min(ranges.len() - 1);
@@ -175,7 +201,7 @@ mod tests {
                     // Left of the edge from a to b, seen along it, is inside.
                     let side = (b - a).perp(&(p - a));
                     if side.abs() > 1e-3 {
-                        let held = cells.binary_search_by_key(&(row, column), |(c, r)| (*r, *c)).is_ok();
+                        let held = cells.binary_search(&(row, column)).is_ok();
                         prop_assert_eq!(held, side > 0.0, "{} {}", column, row);
                     }
                 }

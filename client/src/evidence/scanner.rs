@@ -4,21 +4,26 @@
 //! inside of the outline of their ends, each cell once: ray by ray, the cells before the scanner
 //! would be visited a hundred times and those between far beams never.
 
+mod bumps;
 mod fan;
 mod rings;
+mod spread;
 
 use mapfold_map::geometry::{Level, Point, Robot, UncertainPose};
 use mapfold_map::raster::{EvidencePatch, LogOdds, SensorClass};
-use nalgebra::Matrix3;
 
 use super::Canvas;
-use super::outline::{corner, fixed, whole};
-use super::walk::walk;
+use super::canvas::GRADES;
+use super::outline::{corner, fixed};
+use super::stroke::stroke;
+use super::window::Window;
 use crate::sensor::{Scan, ScannerProfile};
 
+pub(super) use bumps::Bumps;
 pub(super) use fan::Fan;
-use fan::Sheaf;
+use fan::Sheaves;
 use rings::Rings;
+use spread::Spread;
 
 /// How beams become evidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,109 +119,111 @@ pub fn scanner_evidence(
     let rings = Rings::new(scan, level_from_robot.covariance.sd(2), resolution, config);
     let per_metre = resolution.recip();
     let mut fan = std::mem::take(&mut canvas.fan);
-    fan.bumps.make(config.occupied_nat);
+    let mut bumps = std::mem::take(&mut canvas.bumps);
+    bumps.make(config.occupied_nat);
     fan.gather(scan, usable, per_metre);
     let arm = level_from_sensor.position() - pose.position();
-    let covariance = level_from_robot.covariance.matrix();
-    let constant =
-        profile.range_sd_m * profile.range_sd_m + profile.systematic_sd_m * profile.systematic_sd_m;
-    fan.aim(level_from_sensor.heading(), rings.far, |z, direction| {
-        let growth = profile.range_sd_per_m * z * resolution;
-        let along = variance_along(direction, &arm, covariance).max(0.0);
-        (constant + growth * growth + along) * per_metre * per_metre + CELL_VARIANCE
-    });
-    fan.draw_back();
-    let (low, high) = fan.bounds(&start);
-    if let Some((low, rows)) = canvas.begin(low, high) {
+    let spread = Spread::new(profile, level_from_robot, &arm, resolution);
+    let sheaves = fan.aim(level_from_sensor.heading(), rings.far, &spread);
+    let (low, high) = sheaves.bounds(&start, rings.far);
+    if let Some((low, window)) = canvas.begin(low, high) {
         let start = start - Point::new(f64::from(low.column), f64::from(low.row));
-        free(&fan, &rings, start, rows, canvas);
-        hit(&fan, &rings, start, canvas);
+        free(&sheaves, &rings, start, window, canvas);
+        hit(&sheaves, &bumps, &rings, start, canvas);
     }
-    canvas.fan = fan;
+    (canvas.fan, canvas.bumps) = (fan, bumps);
     canvas.take(SensorClass::Scanner, config.step, grades)
 }
 
 /// Lays down what is free. `start` is where the scanner is, in cells from the window's corner.
-fn free(fan: &Fan, rings: &Rings, start: Point, rows: usize, canvas: &mut Canvas) {
+fn free(fan: &Sheaves, rings: &Rings, start: Point, window: Window, canvas: &mut Canvas) {
     let mut outline = std::mem::take(&mut canvas.outline);
-    outline.begin(rows);
+    outline.begin(window);
     // An outline goes through the centres of cells.
     let centre = start - Point::new(0.5, 0.5);
     let eye = corner(&centre);
-    let at = |sheaf: &Sheaf, distance: f64| corner(&(centre + sheaf.direction * distance));
-    let mut before = fan.sheaves.last();
-    for (index, sheaf) in fan.sheaves.iter().enumerate() {
-        let end = at(sheaf, sheaf.free);
-        match before.filter(|_| sheaf.follows) {
-            None => outline.edge(eye, end),
-            Some(before) if sheaf.joins(before) => outline.edge(at(before, before.free), end),
+    let at = |sheaf: usize, free: f32| corner(&(centre + fan.direction(sheaf) * f64::from(free)));
+    let mut last = at(0, fan.free[0]);
+    for sheaf in fan.numbers() {
+        let before = sheaf - 1;
+        let (free, free_before) = (fan.free[sheaf], fan.free[before]);
+        let end = at(sheaf, free);
+        if fan.joins(sheaf) {
+            outline.edge(last, end);
+        } else if fan.follows(sheaf) {
             // What lies between a near end and a far one was seen as far as the near one; the far one's
             // beam went on by itself.
-            Some(before) => {
-                let (near, far) =
-                    if before.free < sheaf.free { (before, sheaf) } else { (sheaf, before) };
-                let beside = at(far, near.free);
-                outline.edge(at(before, before.free), beside);
-                outline.edge(beside, end);
-                cross(far, near.free, &start, rings, canvas);
-            }
+            let near = free.min(free_before);
+            let far = if free_before < free { sheaf } else { before };
+            let beside = at(far, near);
+            outline.edge(last, beside);
+            outline.edge(beside, end);
+            cross(fan, far, near, &start, rings, canvas);
+        } else {
+            outline.edge(eye, end);
         }
-        let next = fan.sheaves.get(index + 1).or(fan.sheaves.first());
-        if !next.is_some_and(|next| next.follows) {
+        if !fan.follows(sheaf + 1) {
             outline.edge(end, eye);
-            if !sheaf.follows {
+            if !fan.follows(sheaf) {
                 // What has no neighbours frees the cells that it crosses.
-                cross(sheaf, 0.0, &start, rings, canvas);
+                cross(fan, sheaf, 0.0, &start, rings, canvas);
             }
         }
-        before = Some(sheaf);
+        last = end;
     }
-    outline.rows(|row, from, to| rings.lay(&centre, row, from, to, canvas));
+    outline.tiles(|x, y, inside| rings.lay(&centre, (x, y), inside, canvas));
     canvas.outline = outline;
 }
 
 /// Frees the cells that a beam crosses by itself, from a distance on.
-fn cross(sheaf: &Sheaf, from: f64, start: &Point, rings: &Rings, canvas: &mut Canvas) {
-    let direction = &sheaf.direction;
-    walk(&(start + direction * from), direction, sheaf.free - from, |cell, entered, left| {
-        let grade = rings.of_beam(from + 0.5 * (entered + left));
-        canvas.lay(cell.row, cell.column, cell.column + 1, grade);
-    });
-}
-
-/// Adds the bumps where beams ended: as many points a cell apart as fit in, each to the cell in which it
-/// lies.
-fn hit(fan: &Fan, rings: &Rings, start: Point, canvas: &mut Canvas) {
-    for sheaf in &fan.sheaves {
-        let bump = fan.bumps.bump(sheaf.sd);
-        let side = (bump.len() / 2) as f64;
-        if sheaf.z < side || sheaf.z + side > rings.far {
-            continue;
-        }
-        let weight = if sheaf.z > rings.heading_to { 0.5 } else { 1.0 } * f64::from(sheaf.count);
-        let weight = fixed(weight);
-        let [mut x, mut y] = corner(&(start + sheaf.end - sheaf.direction * side));
-        let [step_x, step_y] = corner(&sheaf.direction);
-        for value in bump {
-            let value = whole(weight * i64::from(*value));
-            canvas.add(whole(x), whole(y), value.min(i32::from(i16::MAX)) as i16);
-            x += step_x;
-            y += step_y;
+fn cross(
+    fan: &Sheaves,
+    sheaf: usize,
+    from: f32,
+    start: &Point,
+    rings: &Rings,
+    canvas: &mut Canvas,
+) {
+    let (from, free) = (f64::from(from), f64::from(fan.free[sheaf]));
+    let at = |distance: f64| start + fan.direction(sheaf) * distance;
+    let whole_to = rings.heading_to.min(free).max(from);
+    for (from, to, grade) in [(from, whole_to, GRADES - 1), (whole_to, free, GRADES / 2 - 1)] {
+        if from < to {
+            stroke(&at(from), &at(to), |row, first, behind| canvas.lay(row, first, behind, grade));
         }
     }
 }
 
-/// Variance of the scanner's place along a direction: the robot's position projected, and its heading
-/// by the lever of the scanner's place on it, `arm`, in the level frame.
-fn variance_along(direction: &Point, arm: &Point, covariance: &Matrix3<f64>) -> f64 {
-    let (x, y) = (direction.x, direction.y);
-    // d(place along the direction) / d heading.
-    let lever = y * arm.x - x * arm.y;
-    let c = |row, column| covariance[(row, column)];
-    x * x * c(0, 0)
-        + y * y * c(1, 1)
-        + lever * lever * c(2, 2)
-        + 2.0 * (x * y * c(0, 1) + lever * (x * c(0, 2) + y * c(1, 2)))
+/// Adds the bumps where beams ended: as many points a cell apart as fit in, each to the cell in which it
+/// lies.
+fn hit(fan: &Sheaves, bumps: &Bumps, rings: &Rings, start: Point, canvas: &mut Canvas) {
+    let (far, heading_to) = (rings.far as f32, rings.heading_to as f32);
+    let mut marks = canvas.marks();
+    let numbers = fan.numbers();
+    let [x, y, z, sd, along_x, along_y, counts] =
+        [fan.x, fan.y, fan.z, fan.sd, fan.along_x, fan.along_y, fan.counts]
+            .map(|column| &column[numbers.clone()]);
+    let classes = bumps.classes();
+    for at in 0..numbers.len() {
+        let Some(bump) = classes.get(Bumps::class(sd[at])) else { continue };
+        let (side, z) = (bump.side as f32, z[at]);
+        if z < side || z + side > far {
+            continue;
+        }
+        let beams = small(counts[at]) as i32;
+        let halves = if z > heading_to { beams } else { 2 * beams };
+        let values = bump.values().iter().map(|value| (halves * i32::from(*value)) >> 1);
+        let middle = [start.x + f64::from(x[at]), start.y + f64::from(y[at])].map(fixed);
+        let step = [along_x[at], along_y[at]].map(f64::from).map(fixed);
+        marks.add_along(middle, step, bump.side, values);
+    }
+}
+
+/// The whole number nearest to a small one that is not negative.
+fn small(v: f32) -> u32 {
+    // Adding this much leaves the lowest bit of a float just there.
+    const SHIFT: f32 = (1 << 23) as f32;
+    (v + SHIFT).to_bits() & 0xffff
 }
 
 #[cfg(test)]

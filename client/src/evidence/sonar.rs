@@ -16,6 +16,7 @@ pub use verdicts::{SonarRule, SonarVerdicts};
 use super::Canvas;
 use super::canvas::GRADES;
 use super::outline::corner;
+use super::window::Window;
 use crate::sensor::{Ring, SonarProfile};
 use judge::{Echo, judge};
 
@@ -96,15 +97,15 @@ pub fn sonar_evidence(
     let mut verdicts = SonarVerdicts::default();
     let cones = Cones::new(ring, profile, level_from_robot, resolution, config);
     let window = cones.window(ring, level_from_robot).and_then(|(low, high)| {
-        let (low, rows) = canvas.begin(low, high)?;
-        Some((Point::new(f64::from(low.column), f64::from(low.row)), rows))
+        let (low, window) = canvas.begin(low, high)?;
+        Some((Point::new(f64::from(low.column), f64::from(low.row)), window))
     });
-    if let Some((window, rows)) = window {
+    if let Some((origin, window)) = window {
         for (index, sonar) in ring.sonars.iter().enumerate() {
             let pose = level_from_robot.pose.compose(&sonar.robot_from_sensor);
             let echo = judge(ring, index, &pose, walls, resolution, profile, config, &mut verdicts);
             if let Some(echo) = echo {
-                cones.paint(&echo, &pose.position(), pose.heading(), &window, rows, canvas);
+                cones.paint(&echo, &pose.position(), pose.heading(), &origin, window, canvas);
             }
         }
     }
@@ -172,14 +173,14 @@ impl<'a> Cones<'a> {
         (known < CELLS_MAX).then(|| (holding(centre - margin), holding(centre + margin)))
     }
 
-    /// Paints one cone; `window` is the canvas's corner in cells.
+    /// Paints one cone; `origin` is the canvas's corner in cells.
     fn paint(
         &self,
         echo: &Echo,
         place: &Point,
         heading: f64,
-        window: &Point,
-        rows: usize,
+        origin: &Point,
+        window: Window,
         canvas: &mut Canvas,
     ) {
         let arc = echo.arc.map(|(range, weight)| {
@@ -190,10 +191,10 @@ impl<'a> Cones<'a> {
         let clear_to =
             arc.map_or(echo.free_to, |(range, sd, _)| echo.free_to.min(range - ARC_SDS * sd));
         let reach = arc.map_or(echo.free_to, |(range, sd, _)| range + ARC_SDS * sd);
-        let eye = place / self.resolution - window - Point::new(0.5, 0.5);
+        let eye = place / self.resolution - origin - Point::new(0.5, 0.5);
         let (sin, cos) = heading.sin_cos();
         let mut outline = std::mem::take(&mut canvas.outline);
-        outline.begin(rows);
+        outline.begin(window);
         // The outline's chords touch the arc from outside.
         let piece = self.cone / ARC_PIECES as f64;
         let radius = reach / self.resolution / (0.5 * piece).cos();
@@ -207,7 +208,8 @@ impl<'a> Cones<'a> {
         outline.edge(before, corner(&eye));
         let fading = self.profile.range_max_m.recip();
         let free = 1000.0 * self.config.free_nat * echo.free_weight;
-        outline.rows(|row, from, to| {
+        let mut marks = canvas.marks();
+        outline.pieces(|row, from, to| {
             let y = (f64::from(row) - eye.y) * self.resolution;
             for column in from..to {
                 let x = (f64::from(column) - eye.x) * self.resolution;
@@ -226,7 +228,7 @@ impl<'a> Cones<'a> {
                     millinats += 1000.0 * strength * across * bell;
                 }
                 if millinats != 0.0 {
-                    canvas.add(column, row, millinats.round() as i16);
+                    marks.add(column, row, millinats.round() as i32);
                 }
             }
         });

@@ -1,11 +1,13 @@
 //! How much free evidence falls with the distance: rings of equal evidence about the scanner.
 
 use mapfold_map::geometry::Point;
+use mapfold_map::raster::TILE_SIDE;
 
 use super::ScannerEvidenceConfig;
 use crate::evidence::Canvas;
 use crate::evidence::canvas::GRADES;
 use crate::evidence::outline::{fixed, whole};
+use crate::evidence::window::{Rows, bits};
 use crate::sensor::Scan;
 
 /// Rings of equal free evidence, in cells.
@@ -59,29 +61,42 @@ impl Rings {
         grades
     }
 
-    /// The grade of a cell that a beam without neighbours crosses at this distance.
-    pub(super) fn of_beam(&self, distance: f64) -> usize {
-        if distance > self.heading_to { GRADES / 2 - 1 } else { GRADES - 1 }
-    }
-
-    /// Lays free evidence on a piece of a row; `eye` is where the scanner is among the centres of
-    /// cells.
-    pub(super) fn lay(&self, eye: &Point, row: i32, from: i32, to: i32, canvas: &mut Canvas) {
-        let off = f64::from(row) - eye.y;
-        let (left, right) = (f64::from(from) - eye.x, f64::from(to - 1) - eye.x);
-        let farthest_sq = off * off + (left * left).max(right * right);
+    /// Lays free evidence on the cells `inside` of the tile in this column and row of the window; `eye` is
+    /// where the scanner is among the centres of cells.
+    pub(super) fn lay(
+        &self,
+        eye: &Point,
+        (x, y): (usize, usize),
+        inside: &Rows,
+        canvas: &mut Canvas,
+    ) {
+        let side = TILE_SIDE as f64;
+        // Where the scanner is among the centres of the tile's cells.
+        let eye = eye - Point::new(x as f64 * side, y as f64 * side);
+        let farthest = |eye: f64| eye.abs().max((side - 1.0 - eye).abs());
+        let nearest = |eye: f64| (eye - eye.clamp(0.0, side - 1.0)).abs();
+        let farthest_sq = farthest(eye.x).powi(2) + farthest(eye.y).powi(2);
+        let nearest_sq = nearest(eye.x).powi(2) + nearest(eye.y).powi(2);
         for (grade, radius) in self.radii.iter().enumerate().rev() {
-            if farthest_sq <= radius * radius {
-                canvas.lay(row, from, to, grade);
+            let radius_sq = radius * radius;
+            if nearest_sq > radius_sq {
+                continue;
+            }
+            let Some(free) = canvas.free(x, y, grade) else { return };
+            if farthest_sq <= radius_sq {
+                for (free, inside) in free.iter_mut().zip(inside) {
+                    *free |= inside;
+                }
                 return;
             }
-            let half_sq = radius * radius - off * off;
-            if half_sq > 0.0 {
-                let half = half_sq.sqrt();
-                if left <= half && right >= -half {
-                    let first = from.max(1 + whole(fixed(eye.x - half)));
-                    let behind = to.min(1 + whole(fixed(eye.x + half)));
-                    canvas.lay(row, first, behind, grade);
+            for (row, (free, inside)) in free.iter_mut().zip(inside).enumerate() {
+                let off = row as f64 - eye.y;
+                let half = (radius_sq - off * off).max(-1.0).sqrt();
+                // Of what is not a number comes no cell.
+                let first = whole(fixed((eye.x - half).max(-1.0))) + 1;
+                let behind = whole(fixed((eye.x + half).min(side - 1.0))) + 1;
+                if *inside != 0 && half >= 0.0 && first < behind {
+                    *free |= inside & bits(first as u32, behind as u32);
                 }
             }
         }
@@ -124,7 +139,7 @@ mod tests {
         // Two cells sideways at 100.
         let rings = rings(0.001, 0.02);
         assert_eq!(rings.radii, [200.0, 200.0, 100.0, 100.0]);
-        assert_eq!([99.0, 101.0].map(|d| rings.of_beam(d)), [3, 1]);
+        assert_eq!(rings.heading_to, 100.0);
         assert_eq!(rings.far, 200.0);
     }
 }
