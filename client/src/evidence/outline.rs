@@ -86,7 +86,11 @@ impl Outline {
         }
         self.rows = [self.rows[0].min(from), self.rows[1].max(to)];
         let slope = (high.x - low.x) / (high.y - low.y);
-        let mut x = fixed(low.x + (f64::from(from) - low.y) * slope).wrapping_add((1 << POINT) - 1);
+        // Whether the ends of an edge that is all but level are in one row is a matter of rounding: what it
+        // crosses lies between them all the same.
+        let crossed = low.x + (f64::from(from) - low.y) * slope;
+        let crossed = crossed.max(low.x.min(high.x)).min(low.x.max(high.x));
+        let mut x = fixed(crossed).wrapping_add((1 << POINT) - 1);
         let step = fixed(slope);
         for row in from..to {
             // Rounding over a window of a thousand rows: a thousandth of a cell.
@@ -178,6 +182,24 @@ mod tests {
         let corners =
             [(1.2, 0.9), (4.0, 0.9), (4.0, 3.0), (1.2, 3.0)].map(|(x, y)| Point::new(x, y));
         assert_eq!(inside(&corners), [(1, 2), (1, 3), (2, 2), (2, 3)]);
+    }
+
+    #[test]
+    fn an_edge_that_is_level_but_for_rounding_ends_where_its_ends_are() {
+        // Between these two numbers a row begins, by rounding.
+        let border = 3.0 + 0.5 / f64::from(1 << POINT);
+        let (below, above) = (border - 1e-9, border + 1e-9);
+        for (left, right) in [(below, above), (above, below)] {
+            let corners = [(50.2, left), (60.8, right), (60.8, 5.5), (50.2, 5.5)]
+                .map(|(x, y)| Point::new(x, y));
+            let cells = inside(&corners);
+            assert!(
+                cells
+                    .iter()
+                    .all(|(row, column)| (3..=5).contains(row) && (51..=60).contains(column))
+            );
+            assert!(cells.len() >= 20, "{cells:?}");
+        }
     }
 
     proptest! {

@@ -15,8 +15,11 @@ pub(super) fn stroke(a: &Point, b: &Point, mut visit: impl FnMut(i32, i32, i32))
     let slope = (high.x - low.x) / (high.y - low.y);
     let mut x = low.x + (f64::from(first) + 1.0 - low.y) * slope;
     let mut entered = cell(low.x);
+    // Whether the ends of a line that is all but level are in one row is a matter of rounding: it goes no
+    // farther than its ends all the same.
+    let (leftmost, rightmost) = (low.x.min(high.x), low.x.max(high.x));
     for row in first..last {
-        let left = cell(x);
+        let left = cell(x.max(leftmost).min(rightmost));
         visit(row, entered.min(left), entered.max(left) + 1);
         entered = left;
         x += slope;
@@ -34,6 +37,21 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    #[test]
+    fn a_line_that_is_level_but_for_rounding_ends_where_its_ends_are() {
+        // Between these two numbers a row begins, by rounding.
+        let border = 4.0 - 0.5 / f64::from(1 << 20);
+        let (below, above) = (border - 1e-9, border + 1e-9);
+        for (left, right) in [(below, above), (above, below)] {
+            let mut columns = BTreeSet::new();
+            stroke(&Point::new(10.5, left), &Point::new(20.5, right), |row, from, to| {
+                assert!((3..=4).contains(&row));
+                columns.extend(from..to);
+            });
+            assert!(columns.into_iter().eq(10..21));
+        }
+    }
 
     proptest! {
         #[test]

@@ -132,7 +132,7 @@ impl Fan {
             let (x, y) = (unit_x * z, unit_y * z);
             let (off_x, off_y) = (x - first[0], y - first[1]);
             let is_near = off_x * off_x + off_y * off_y <= TOGETHER * TOGETHER;
-            if is_near & follows & (sum[0] < TOGETHER_MOST) {
+            if is_near & follows && sum[0] < TOGETHER_MOST {
                 sum = [sum[0] + 1.0, sum[1] + x, sum[2] + y, sum[3] + z];
             } else {
                 at += 1;
