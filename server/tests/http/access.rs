@@ -25,6 +25,7 @@ fn table(floor: &Level, look: &Value) -> Vec<Row> {
     let site = |template: &str| route::of_site(template, &floor.site);
     let contribution = format!("{}/{}", level(route::CONTRIBUTIONS), look["id"].as_str().unwrap());
     let revert = level(route::REVERT).replace("{id}", look["id"].as_str().unwrap());
+    let change = level(route::CHANGE).replace("{id}", "new");
     let tile = level(route::TILES).replace("{z}/{row}/{col}", "6/0/0.png");
     let cells = level(route::RASTER_TILE).replace("{x}/{y}", "0/0");
     let export = |format| level(route::EXPORTS).replace("{format}", format);
@@ -78,7 +79,7 @@ fn table(floor: &Level, look: &Value) -> Vec<Row> {
         ("GET", export("geojson"), none.clone(), read),
         ("GET", export("nav2"), none.clone(), read),
         ("GET", level(route::IMPORTS), none.clone(), read),
-        ("POST", level(route::IMPORTS), json!("no zip"), [401, 403, 404, 403, 415]),
+        ("POST", level(route::IMPORTS), json!("no model"), [401, 403, 404, 403, 422]),
         ("DELETE", level(route::IMPORTS), none.clone(), [401, 403, 404, 403, 404]),
         ("GET", level(route::GDB), none.clone(), read),
         ("PUT", level(route::GDB), json!({}), [401, 403, 404, 403, 428]),
@@ -88,6 +89,9 @@ fn table(floor: &Level, look: &Value) -> Vec<Row> {
         ("GET", level(route::GDB_FINDINGS), none.clone(), read),
         ("GET", level(route::GDB_PLAN), none.clone(), read),
         ("POST", level(route::GDB_PRIOR), none.clone(), [401, 403, 404, 403, 404]),
+        ("GET", level(route::GDB_GLB), none.clone(), read),
+        ("GET", level(route::CHANGES), none.clone(), read),
+        ("POST", change, json!({"answer": "dismiss"}), [401, 403, 404, 403, 404]),
         ("GET", level(route::LANDMARKS), none.clone(), read),
         ("GET", site(route::PROTOTYPES), none.clone(), read),
         ("PUT", site(route::PROTOTYPES), json!({}), [401, 403, 404, 403, 428]),
@@ -155,7 +159,7 @@ fn template_of(path: &str) -> String {
     }
     match parts.get(5..) {
         Some(["robots", robot, ..]) if robot.starts_with('{') => parts[6] = "{robot}",
-        Some([_, _, "contributions" | "reverts", _]) => parts[8] = "{id}",
+        Some([_, _, "contributions" | "reverts" | "changes", _]) => parts[8] = "{id}",
         Some([_, _, "tiles", ..]) => {
             parts.splice(8.., ["{z}", "{row}", "{col}.png"]).for_each(drop);
         }

@@ -189,7 +189,7 @@ fn a_program_that_is_called_wrongly_says_so() {
         (vec!["--config", "/nowhere.toml"], 1, "/nowhere.toml"),
         (vec!["--log", "a=b=c"], 1, "log"),
         (vec!["import", "x"], 2, "import"),
-        (vec!["export", "dxf"], 2, "dxf"),
+        (vec!["export", "stl"], 2, "stl"),
         (vec!["export", "geojson", "--site", "a", "--level", "b", "--out", "x"], 1, "no database"),
         (vec!["verify", "--site", "a", "--level", "b"], 1, "no database"),
         (vec!["backup", "x"], 1, "no database"),

@@ -28,18 +28,21 @@ fn sinces() -> impl Iterator<Item = i64> {
 /// Submits all looks, then dies as soon as rows of revision `written` are stored; what readers were told last.
 async fn live_and_die(database: &Database, options: LevelOptions, written: i64) -> Vec<Vec<u8>> {
     let database = database.clone();
-    killed_after(move || async move {
+    let (told, _held) = killed_after(move || async move {
         let store = database.store().await;
         furnish(&store).await;
-        let (_levels, level) = open(&store, options).await;
+        let (levels, level) = open(&store, options).await;
         let snapshot = submit_all(&level, &looks(21, LOOKS)).await;
         // Rows are written behind the answers, whenever the machine finds the time.
         while store.revisions(SITE, LEVEL).await.unwrap().unwrap().folded < written {
             tokio::time::sleep(Duration::from_millis(5)).await;
         }
-        sinces().map(|since| bits(&snapshot, since)).collect()
+        let told = sinces().map(|since| bits(&snapshot, since)).collect();
+        // Who lets go of a level in time closes it, with its rows written: the killed do not.
+        (told, (levels, level))
     })
-    .await
+    .await;
+    told
 }
 
 async fn comes_back(database: &Database, before: &[Vec<u8>]) {
