@@ -42,6 +42,7 @@ pub mod honesty;
 pub mod level;
 pub mod meter;
 pub mod plane;
+pub mod plans;
 pub mod programs;
 pub mod range;
 pub mod raster;

@@ -6,8 +6,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use mapfold_tests::{
-    change, differences, evaluation, extraction, figure, growth, honesty, range, raster, serving,
-    speed, structures,
+    change, differences, evaluation, extraction, figure, growth, honesty, plans, range, raster,
+    serving, speed, structures,
 };
 
 /// Measures Mapfold and rewrites the tables of a report between their markers.
@@ -63,6 +63,12 @@ enum Command {
     /// Removes, adds and moves things on simulated floors, and measures what is told against the model
     Differences {
         /// The page with the markers `differences`
+        #[arg(long, value_name = "FILE")]
+        report: PathBuf,
+    },
+    /// Cuts models of up to 20 000 walls, and times what is made of them
+    Plans {
+        /// The page with the markers `plans`
         #[arg(long, value_name = "FILE")]
         report: PathBuf,
     },
@@ -125,6 +131,7 @@ async fn main() -> ExitCode {
         Command::Extraction { report, data } => extraction::extraction(&report, data.as_deref()),
         Command::Change { report } => change::table(&report),
         Command::Differences { report } => differences::table(&report),
+        Command::Plans { report } => plans::table(&report),
         Command::Serving { report } => serving::tables(&report).await,
         Command::Structures { report } => structures::table(&report),
         Command::Figure { out } => figure::write(&out).await.map(|()| Vec::new()),
