@@ -2,7 +2,6 @@
 //! against it.
 
 use std::path::Path;
-use std::time::Instant;
 
 use mapfold_map::changes::{ChangeConfig, changes};
 use mapfold_map::gdb::{
@@ -10,6 +9,7 @@ use mapfold_map::gdb::{
     landmarks, prior,
 };
 use mapfold_map::level::LevelMap;
+use tokio::time::Instant;
 
 use crate::statistics::quantile;
 use crate::{Error, report};
