@@ -94,7 +94,8 @@ fn goes_on(last: &Bordering, next: &Bordering) -> bool {
     // Within one step of the chord: area <= chord * 1.
     let off = side(last.from, next.to, last.to);
     let chord = along(last.from, next.to, next.to);
-    last.drawn == next.drawn || off * off <= chord
+    // Not squared: what is off by kilometres would not fit into 128 bits.
+    last.drawn == next.drawn || off.abs() <= chord.isqrt()
 }
 
 #[cfg(test)]
@@ -116,6 +117,13 @@ mod tests {
         let corners =
             |ring: &Vec<Bordering>| ring.iter().map(|e| (e.from.x, e.from.y)).collect::<Vec<_>>();
         assert_eq!(rings.iter().map(corners).collect::<Vec<_>>(), [a.to_vec(), b.to_vec()]);
+    }
+
+    #[test]
+    fn corners_kilometres_apart_stay_corners() {
+        let far = 9_000_000_000;
+        let edges: Vec<Bordering> = border(&[(-far, -far), (0, -far), (far, far)]).collect();
+        assert_eq!(straightened(&edges[..2], false), edges[..2]);
     }
 
     #[test]
