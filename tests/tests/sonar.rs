@@ -124,6 +124,7 @@ async fn a_robot_with_a_mirror_knows_echoes_from_behind_walls_for_ghosts() -> Re
     let part = server.folder().join("part.log.gz");
     log.write_part(2600, 2700, &part)?;
     Robot::new("clara", &part).start(&target, server.folder())?.finish().await?;
+    Level::new(server.api()?, &target.site, &target.level).folded().await?;
 
     let heard = server.folder().join("detours.log");
     std::fs::write(&heard, detours(&log, 2600..2700)).map_err(|e| Error::file(&heard, e))?;

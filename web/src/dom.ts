@@ -25,6 +25,16 @@ export function el<K extends keyof HTMLElementTagNameMap>(
   return element;
 }
 
+/** The head of a card that folds. It only asks for a turn: the browser tells of one it made by itself a moment later, and a
+ * frame drawn in between would take it back. */
+export function foldingHead(title: string, turn: () => void): HTMLElement {
+  const click = (event: Event): void => {
+    event.preventDefault();
+    turn();
+  };
+  return el("summary", { on: { click } }, el("h2", { text: title }));
+}
+
 /** Sets an element's text, if it is another. */
 export function setText(element: Element, text: string): void {
   if (element.textContent !== text) element.textContent = text;

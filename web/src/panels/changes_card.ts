@@ -2,7 +2,7 @@
 
 import { changeInWords, evidenceInWords, KIND_WORDS, middleOf, sorted, waiting } from "../changes";
 import { mayAnswer, type ChangeActions } from "../changing";
-import { el, setShown, setText } from "../dom";
+import { el, foldingHead, setShown, setText } from "../dom";
 import type { State } from "../state";
 import type { Store } from "../store";
 import type { ModelChange, ModelChangeAnswer } from "../wire";
@@ -32,14 +32,10 @@ export function createChangesCard(parent: HTMLElement, { store, actions }: { sto
   const more = el("p", { class: "hint" });
   const details = el(
     "details",
-    {
-      on: {
-        toggle: () => {
-          actions.open(details.open);
-        },
-      },
-    },
-    el("summary", {}, el("h2", { text: "Changes" })),
+    {},
+    foldingHead("Changes", () => {
+      actions.open(!details.open);
+    }),
     el("div", { class: "folding-head" }, now),
     barred,
     problem,

@@ -3,7 +3,7 @@
 import { mayPublish, type DraftActions } from "../drafting";
 import { entryInWords, entryProvenance, placeOf, readiness, READINESS_WORDS } from "../drafts";
 import { unsentCount } from "../editing";
-import { el, keyed, logRow, setShown, setText } from "../dom";
+import { el, foldingHead, keyed, logRow, setShown, setText } from "../dom";
 import type { State } from "../state";
 import type { Store } from "../store";
 import type { GdbEntry, GdbFinding } from "../wire";
@@ -27,14 +27,10 @@ export function createModelCard(parent: HTMLElement, { store, actions }: { store
   const drawEntries = keyed<GdbEntry>(list, { key: ({ id }) => id, make: (entry) => logRow(entryInWords(entry), entryProvenance(entry)) });
   const details = el(
     "details",
-    {
-      on: {
-        toggle: () => {
-          actions.open(details.open);
-        },
-      },
-    },
-    el("summary", {}, el("h2", { text: "Model" })),
+    {},
+    foldingHead("Model", () => {
+      actions.open(!details.open);
+    }),
     el("div", { class: "folding-head" }, now, publish),
     barred,
     unsent,

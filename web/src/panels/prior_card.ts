@@ -1,7 +1,7 @@
 // The prior of the level: a map of another program below what robots see. Who may edit hands one in
 // here, after seeing what the server read in it, or takes it away.
 
-import { el, keyed, logRow, setShown, setText } from "../dom";
+import { el, foldingHead, keyed, logRow, setShown, setText } from "../dom";
 import { importInWords, priorOf, provenanceInWords, reportInWords } from "../imports";
 import type { ImportActions } from "../importing";
 import { mayRevert } from "../reverting";
@@ -84,14 +84,10 @@ export function createPriorCard(parent: HTMLElement, actions: ImportActions): (s
   const drawList = keyed<Import>(list, { key: ({ id }) => id, make: (made) => logRow(importInWords(made), provenanceInWords(made)) });
   const details = el(
     "details",
-    {
-      on: {
-        toggle: () => {
-          actions.open(details.open);
-        },
-      },
-    },
-    el("summary", {}, el("h2", { text: "Prior" })),
+    {},
+    foldingHead("Prior", () => {
+      actions.open(!details.open);
+    }),
     el("div", { class: "folding-head" }, now, remove),
     form,
     barred,
