@@ -65,6 +65,8 @@ pub struct ChangeConfig {
     pub join: f64,
     /// Objects are looked for as far from where they should be as this, metres.
     pub move_max: f64,
+    /// The most surface that a plan may have, metres: all of it is probed.
+    pub surface_max: f64,
 }
 
 impl ChangeConfig {
@@ -85,6 +87,7 @@ impl ChangeConfig {
             hull_noise: 0.03,
             join: 0.3,
             move_max: 10.0,
+            surface_max: 1e6,
         }
     }
 
@@ -171,8 +174,33 @@ pub struct Change {
     pub last_seen_us: Option<i64>,
 }
 
+/// A plan with more surface than is probed.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error(
+    "the plan has {surface:.0} m of surface, and at most {surface_max:.0} m are held against the map: cut the level \
+     into smaller ones"
+)]
+pub struct TooMuchSurface {
+    /// What it has, metres.
+    pub surface: f64,
+    /// The limit, metres.
+    pub surface_max: f64,
+}
+
 /// What a level's map says against a plan of its model; by identity. The map's scale and frame are the plan's.
-pub fn changes(plan: &Plan, map: &LevelMap, config: &ChangeConfig) -> BTreeMap<ChangeId, Change> {
+///
+/// # Errors
+/// [`TooMuchSurface`].
+pub fn changes(
+    plan: &Plan,
+    map: &LevelMap,
+    config: &ChangeConfig,
+) -> Result<BTreeMap<ChangeId, Change>, TooMuchSurface> {
+    let surface = plan.edges().map(|edge| edge.from.distance(edge.to)).sum();
+    let surface_max = config.surface_max;
+    if surface > surface_max {
+        return Err(TooMuchSurface { surface, surface_max });
+    }
     let surfaces = Surfaces::of(plan);
     let found = Found::of(map, plan, &surfaces, config);
     let mut scanned = Scanned::new(&map.tiles, config.resolution);
@@ -216,7 +244,7 @@ pub fn changes(plan: &Plan, map: &LevelMap, config: &ChangeConfig) -> BTreeMap<C
         let things = BTreeSet::from([index]);
         changes.insert(id, told(id, What::New, &[], probe::OfOwner::default(), &found, &things));
     }
-    changes
+    Ok(changes)
 }
 
 fn told(

@@ -1,8 +1,9 @@
-//! The digest by which a contribution's content is known.
+//! The digest by which a contribution's content is known, and identities made of digests.
 
 use std::fmt::Write as _;
 
 use sha2::{Digest, Sha256};
+use uuid::Uuid;
 
 use crate::codec::{self, EncodeError};
 use crate::v1;
@@ -15,6 +16,13 @@ use crate::v1;
 pub fn content_digest(contribution: &v1::Contribution) -> Result<String, EncodeError> {
     let digest = Sha256::digest(codec::to_cbor(contribution)?);
     Ok(hexadecimal(&digest))
+}
+
+/// The identity that a digest gives, a UUID of version 8: the same whenever the same was digested.
+pub fn identity(digest: &[u8; 32]) -> Uuid {
+    let mut bytes = [0; 16];
+    bytes.copy_from_slice(&digest[..16]);
+    uuid::Builder::from_custom_bytes(bytes).into_uuid()
 }
 
 /// Bytes in lower-case hexadecimal.

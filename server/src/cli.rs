@@ -7,6 +7,7 @@ mod export;
 mod export_model;
 mod import;
 mod import_building;
+mod import_draft;
 mod import_model;
 mod serve;
 mod token;

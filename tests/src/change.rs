@@ -6,30 +6,22 @@
 
 use std::path::Path;
 
-use mapfold_client::log::{Observation, Reading};
-use mapfold_client::robot::{OdometryNoise, PoseSd, PoseSource, Surveyor, SurveyorConfig};
-use mapfold_client::sensor::{Scan, ScanGeometry, Sensors, preset};
-use mapfold_map::geometry::{self, Pose};
-use mapfold_map::level::{Contribution, Level, LevelConfig, Provenance};
+use mapfold_map::geometry;
+use mapfold_map::level::{Contribution, Level, LevelConfig};
 use mapfold_map::raster::{Cell, SensorClass, SliceConfig, TileKey};
 
 use crate::plane::{Piece, Point};
-use crate::simulation::{Noise, Scanner, World};
+use crate::simulation::{Noise, World};
+use crate::surveying::{Looker, RESOLUTION_M, START_S};
 use crate::{Error, report};
 
-/// Edge of a cell, metres.
-const RESOLUTION_M: f64 = 0.05;
 /// Size of the hall, metres.
 const HALL_M: (f64, f64) = (12.0, 8.0);
 /// Half the size of the shelf, metres.
 const SHELF_M: (f64, f64) = (1.0, 0.3);
 /// The middle of the shelf before and after, metres.
 const PLACES: [(f64, f64); 2] = [(3.5, 4.0), (8.5, 4.0)];
-/// A morning in 2026, seconds since 1970.
-const START_S: f64 = 1_790_000_000.0;
 const DAY_S: f64 = 86_400.0;
-/// Standard deviations of a pose, metres and radians.
-const POSE_SD: (f64, f64) = (0.01, 0.003);
 /// The share of a shelf's outline that must read as it is.
 const MOST: f64 = 0.9;
 /// A slice that holds all days.
@@ -54,7 +46,7 @@ pub struct Following {
 /// Settings that the surveyor refuses: none of these.
 pub fn follow(days: u32, looks_a_day: u32, slice_s: u32, seed: u64) -> Result<Following, Error> {
     let mut noise = Noise::of_seed(seed);
-    let mut surveyor = surveyor()?;
+    let mut robot = Looker::new("ada", 7)?;
     let standard = LevelConfig::standard(RESOLUTION_M);
     let slices = SliceConfig { length_s: slice_s, ..standard.slices };
     let mut level = Level::new(LevelConfig { slices, ..standard });
@@ -63,8 +55,8 @@ pub fn follow(days: u32, looks_a_day: u32, slice_s: u32, seed: u64) -> Result<Fo
     let mut look = |world: &World, day: u32, of_day: u32| -> Option<Contribution> {
         let time_s = START_S + DAY_S * f64::from(day) + 30.0 * f64::from(of_day);
         index += 1;
-        let reading = reading(world, index, time_s, &mut noise);
-        surveyor.survey(&reading).ok().map(|look| look.contribution)
+        let place = stand(&mut noise);
+        robot.look(world, place, (index, time_s), &mut noise)
     };
     for day in 0..days {
         for of_day in 0..looks_a_day {
@@ -90,25 +82,8 @@ pub fn follow(days: u32, looks_a_day: u32, slice_s: u32, seed: u64) -> Result<Fo
     Ok(following)
 }
 
-fn surveyor() -> Result<Surveyor, Error> {
-    let sensors = preset("sick-lms").map(|s| Sensors { sonar: None, ..s }).unwrap_or_default();
-    let config = SurveyorConfig {
-        robot: "ada".to_owned(),
-        sensors,
-        emulate_sonar: false,
-        poses: PoseSource::Log,
-        pose_sd: PoseSd { position_m: POSE_SD.0, heading_rad: POSE_SD.1 },
-        provenance: Provenance::Datum,
-        odometry: OdometryNoise::STANDARD,
-        resolution: RESOLUTION_M,
-        source: [7; 32],
-    };
-    Surveyor::new(config, 0).map_err(Error::Survey)
-}
-
-/// What a robot somewhere in the aisle round the shelves reads.
-fn reading(world: &World, index: u32, time_s: f64, noise: &mut Noise) -> Reading {
-    let scanner = Scanner::default();
+/// Somewhere in the aisle round the shelves, with any heading.
+fn stand(noise: &mut Noise) -> (Point, f64) {
     let (width, height) = HALL_M;
     // Along the walls, a metre and a half off, anywhere.
     let (inner_x, inner_y) = (width - 3.0, height - 3.0);
@@ -123,29 +98,7 @@ fn reading(world: &World, index: u32, time_s: f64, noise: &mut Noise) -> Reading
         (0.0, along - 2.0 * inner_x - inner_y)
     };
     let at = Point::new(1.5 + x, 1.5 + y);
-    let heading = (noise.share() - 0.5) * std::f64::consts::TAU;
-    let ranges = scanner.scan(world, (at, heading), noise);
-    let told = Pose::new(
-        at.x + noise.normal(POSE_SD.0),
-        at.y + noise.normal(POSE_SD.0),
-        heading + noise.normal(POSE_SD.1),
-    );
-    Reading {
-        index,
-        time_s,
-        level_from_robot: Some(told),
-        odom_from_robot: None,
-        observation: Observation::Scan(Scan {
-            geometry: ScanGeometry {
-                first_bearing: -std::f64::consts::FRAC_PI_2,
-                increment: 1f64.to_radians(),
-            },
-            ranges,
-            range_max: scanner.cap_m,
-            robot_from_sensor: Pose::identity(),
-            repeats: Vec::new(),
-        }),
-    }
+    (at, (noise.share() - 0.5) * std::f64::consts::TAU)
 }
 
 fn rectangle((left, low): (f64, f64), (right, high): (f64, f64)) -> Vec<Piece> {

@@ -6,26 +6,18 @@ mod floor;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use mapfold_client::log::{Observation, Reading};
-use mapfold_client::robot::{OdometryNoise, PoseSd, PoseSource, Surveyor, SurveyorConfig};
-use mapfold_client::sensor::{Scan, ScanGeometry, Sensors, preset};
 use mapfold_map::changes::{Change, ChangeConfig, ChangeId, What, changes};
 use mapfold_map::gdb::{ObjectId, Structure};
-use mapfold_map::geometry::Pose;
-use mapfold_map::level::{Level, LevelConfig, Provenance};
+use mapfold_map::level::{Level, LevelConfig};
 
 use crate::plane::{Point, distance_to_hull};
-use crate::simulation::{Noise, Scanner};
+use crate::simulation::Noise;
+use crate::surveying::{Looker, RESOLUTION_M, START_S};
 use crate::{Error, report};
 use floor::{Fate, Floor};
 
-const RESOLUTION_M: f64 = 0.05;
 /// The height that models are cut at, metres.
 const HEIGHT_M: f64 = 0.3;
-/// A morning in 2026, seconds since 1970.
-const START_S: f64 = 1_790_000_000.0;
-/// Standard deviations of a pose, metres and radians.
-const POSE_SD: (f64, f64) = (0.01, 0.003);
 /// Beams that must meet an object, or pass where it should be, in a look at it.
 const BEAMS_MIN: u32 = 5;
 /// Floors, and looks at each.
@@ -70,7 +62,7 @@ fn watch(seed: u64) -> Result<Told, Error> {
     let world = floor.world();
     let config = ChangeConfig::standard(RESOLUTION_M);
     let mut level = Level::new(LevelConfig::standard(RESOLUTION_M));
-    let mut surveyors = [surveyor("ada", 7)?, surveyor("bob", 8)?, surveyor("eve", 9)?];
+    let mut robots = [Looker::new("ada", 7)?, Looker::new("bob", 8)?, Looker::new("eve", 9)?];
     let mut seen: BTreeMap<usize, u32> = BTreeMap::new();
     let mut told = Told { unchanged: floor.unchanged(), ..Told::default() };
     told.cases = floor.cases().map(|(_, fate)| Case::of(fate)).collect();
@@ -78,23 +70,18 @@ fn watch(seed: u64) -> Result<Told, Error> {
     for look in 0..LOOKS {
         let at = floor.stand(&mut noise);
         let heading = (noise.share() - 0.5) * std::f64::consts::TAU;
-        let scanner = Scanner::default();
-        let ranges = scanner.scan(&world, (at, heading), &mut noise);
-        let told_pose = Pose::new(
-            at.x + noise.normal(POSE_SD.0),
-            at.y + noise.normal(POSE_SD.0),
-            heading + noise.normal(POSE_SD.1),
-        );
-        let reading = reading(look, ranges, scanner.cap_m, told_pose);
-        let surveyor = &mut surveyors[look as usize % 3];
-        let Ok(looked) = surveyor.survey(&reading) else { continue };
-        level.fold(&[looked.contribution]);
+        let when = (look, START_S + 30.0 * f64::from(look));
+        let robot = &mut robots[look as usize % 3];
+        let Some(contribution) = robot.look(&world, (at, heading), when, &mut noise) else {
+            continue;
+        };
+        level.fold(&[contribution]);
         for (case, (index, _)) in floor.cases().enumerate() {
             if floor.beams(index, &world, at, heading) >= BEAMS_MIN {
                 *seen.entry(case).or_default() += 1;
             }
         }
-        let found = changes(&plan, level.map(), &config);
+        let found = changes(&plan, level.map(), &config).map_err(Error::Surface)?;
         let is_last = look + 1 == LOOKS;
         for (case, (index, fate)) in floor.cases().enumerate() {
             let about = |change: &&Change| floor.is_about(index, change);
@@ -126,46 +113,6 @@ fn watch(seed: u64) -> Result<Told, Error> {
 impl Case {
     fn of(fate: Fate) -> Self {
         Self { fate, looks: 0, noticed: None, right: None, right_at_last: false }
-    }
-}
-
-fn surveyor(robot: &str, source: u8) -> Result<Surveyor, Error> {
-    let sensors = preset("sick-lms").map(|s| Sensors { sonar: None, ..s }).unwrap_or_default();
-    let config = SurveyorConfig {
-        robot: robot.to_owned(),
-        sensors,
-        emulate_sonar: false,
-        poses: PoseSource::Log,
-        pose_sd: PoseSd { position_m: POSE_SD.0, heading_rad: POSE_SD.1 },
-        provenance: Provenance::Datum,
-        odometry: OdometryNoise::STANDARD,
-        resolution: RESOLUTION_M,
-        source: [source; 32],
-    };
-    Surveyor::new(config, 0).map_err(Error::Survey)
-}
-
-fn reading(
-    index: u32,
-    ranges: Vec<f64>,
-    range_max: f64,
-    told: Pose<mapfold_map::geometry::Level, mapfold_map::geometry::Robot>,
-) -> Reading {
-    Reading {
-        index,
-        time_s: START_S + 30.0 * f64::from(index),
-        level_from_robot: Some(told),
-        odom_from_robot: None,
-        observation: Observation::Scan(Scan {
-            geometry: ScanGeometry {
-                first_bearing: -std::f64::consts::FRAC_PI_2,
-                increment: 1f64.to_radians(),
-            },
-            ranges,
-            range_max,
-            robot_from_sensor: Pose::identity(),
-            repeats: Vec::new(),
-        }),
     }
 }
 

@@ -52,6 +52,17 @@ pub enum Error {
     /// A robot that cannot survey.
     #[error("survey: {0}")]
     Survey(mapfold_client::robot::SurveyorError),
+    /// A floor with more surface than is held against a map.
+    #[error("{0}")]
+    Surface(mapfold_map::changes::TooMuchSurface),
+    /// A script of the page's tests that failed.
+    #[error("{script}: {told}")]
+    Script {
+        /// Which.
+        script: String,
+        /// How it ended, and all that it said.
+        told: String,
+    },
     /// A database that cannot be made.
     #[error("database: {0}")]
     Database(String),

@@ -14,11 +14,14 @@
 //! * [`honesty`]: what maps claim against how wrong they are.
 //! * [`programs`], [`database`], [`server`], [`robot`], [`fleet`], [`meter`], [`api`], [`level`]: the real
 //!   programs, the network between them, and what they answer.
+//! * [`page`]: what the operators' page shows in a browser.
 //! * [`trial`]: a log played as a fleet into a fresh server, and what came of it.
 //! * [`extraction`], [`yardstick`]: how well and how fast lines are found in scans, beside the least code that
 //!   finds lines.
 //! * [`range`]: simulated heads, their calibration, and how well their ranges are corrected.
 //! * [`change`]: how soon a map follows what has moved.
+//! * [`differences`]: what is told of a floor that is not as its model, and how soon.
+//! * [`plans`]: what vast models cost.
 //! * [`serving`]: how long a server takes to answer about small and vast rasters.
 //! * [`structures`]: whether and how fast a place is found among landmarks.
 //! * [`figure`]: a hallway's map as a picture.
@@ -41,6 +44,7 @@ pub mod growth;
 pub mod honesty;
 pub mod level;
 pub mod meter;
+pub mod page;
 pub mod plane;
 pub mod plans;
 pub mod programs;
@@ -54,6 +58,7 @@ pub mod simulation;
 pub mod speed;
 pub mod statistics;
 pub mod structures;
+mod surveying;
 pub mod trial;
 pub mod yardstick;
 

@@ -69,7 +69,8 @@ pub fn table(page: &Path) -> Result<Vec<String>, Error> {
         let (found, landmarks_ms) = took(|| landmarks(&plan, &LandmarkConfig::STANDARD).len());
         let (_, prior_ms) = took(|| prior(&plan, &PriorConfig::standard(0.05)).map(|p| p.len()));
         let map = LevelMap::default();
-        let (_, changes_ms) = took(|| changes(&plan, &map, &ChangeConfig::standard(0.05)).len());
+        let (_, changes_ms) =
+            took(|| changes(&plan, &map, &ChangeConfig::standard(0.05)).map(|c| c.len()));
         let all = [plan_ms, findings_ms, landmarks_ms, prior_ms, changes_ms];
         let each = all.map(|ms| ms / walls);
         let first = *smallest.get_or_insert(each);

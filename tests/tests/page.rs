@@ -2,16 +2,15 @@
 //! follows what robots send within two seconds, and logs no error.
 
 use std::path::Path;
-use std::process::Stdio;
 
 use mapfold_tests::Error;
 use mapfold_tests::carmen::Log;
 use mapfold_tests::database::Database;
 use mapfold_tests::level::Level;
+use mapfold_tests::page;
 use mapfold_tests::robot::{Robot, Target};
 use mapfold_tests::server::Server;
 use serde_json::Value;
-use tokio::process::Command;
 
 /// How long the page is watched while a robot sends, seconds.
 const WATCH_S: u32 = 15;
@@ -38,29 +37,10 @@ async fn the_page_shows_the_map_and_follows_it() -> Result<(), Error> {
 
     // About two scans a second come in while the page is watched.
     let _bruno = Robot::new("bruno", &during).with(&["--speed", "4"]).start(&target, folder)?;
-    let web = Path::new(env!("CARGO_MANIFEST_DIR")).join("../web");
-    let output = Command::new("node")
-        .arg("e2e/page.mjs")
-        .current_dir(&web)
-        .env("PAGE_URL", server.url())
-        .env("TOKEN", server.admin_token())
-        .env("SITE", "mit")
-        .env("LEVEL", "floor")
-        .env("WATCH_S", WATCH_S.to_string())
-        .stdin(Stdio::null())
-        .output()
-        .await
-        .map_err(|e| Error::file(web.join("e2e/page.mjs"), e))?;
-    let said = String::from_utf8_lossy(&output.stdout);
-    let complaint = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{}\n{said}{complaint}", output.status);
-
-    let events: Vec<Value> =
-        said.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
-    let event = |name: &str| {
-        let found = events.iter().find(|event| event["event"] == name);
-        found.cloned().unwrap_or_default()
-    };
+    let watch_s = WATCH_S.to_string();
+    let settings = [("WATCH_S", watch_s.as_str())];
+    let said = page::play(&server, "page.mjs", ["mit", "floor"], &settings).await?;
+    let event = |name: &str| said.event(name);
     let (shown, end) = (event("shown"), event("end"));
     let number = |event: &Value, name: &str| event[name].as_f64().unwrap_or(-1.0);
     println!("{shown}\n{end}");

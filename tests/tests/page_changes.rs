@@ -1,9 +1,6 @@
 //! The page's card of changes in headless Chromium against a real server: robots drive through a simulated hall whose model
 //! lacks a pillar, has a machine that is not there, and another pillar in the wrong place; an operator answers.
 
-use std::path::Path;
-use std::process::Stdio;
-
 use mapfold_schema::route;
 use mapfold_schema::v1::{
     GdbCollection, GdbPlacement, ModelChangeKind, ModelChangeState, ModelChanges,
@@ -13,10 +10,10 @@ use mapfold_tests::carmen::Log;
 use mapfold_tests::database::Database;
 use mapfold_tests::fleet;
 use mapfold_tests::level::Level;
+use mapfold_tests::page;
 use mapfold_tests::server::Server;
 use mapfold_tests::simulation::{Recording, Scanner, hall, record};
 use serde_json::{Value, json};
-use tokio::process::Command;
 use uuid::Uuid;
 
 /// How the hall is turned in its level, radians, and half the side of its pillars, metres.
@@ -89,29 +86,11 @@ async fn the_page_tells_what_robots_found_and_takes_answers() -> Result<(), Erro
     let reader =
         server.command(&[&["token", "create", "--site", "plant"], &scopes[..]].concat()).await?;
 
-    let web = Path::new(env!("CARGO_MANIFEST_DIR")).join("../web");
-    let output = Command::new("node")
-        .arg("e2e/changes.mjs")
-        .current_dir(&web)
-        .env("PAGE_URL", server.url())
-        .env("TOKEN", server.admin_token())
-        .env("READER", reader.trim())
-        .env("SITE", "plant")
-        .env("LEVEL", "hall")
-        .stdin(Stdio::null())
-        .output()
-        .await
-        .map_err(|e| Error::file(web.join("e2e/changes.mjs"), e))?;
-    let said = String::from_utf8_lossy(&output.stdout);
-    let complaint = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{}\n{said}{complaint}", output.status);
-    let events: Vec<Value> =
-        said.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
-    let event = |name: &str| {
-        let found = events.iter().find(|event| event["event"] == name);
-        found.cloned().unwrap_or_default()
-    };
-    let text = |name: &str, field: &str| event(name)[field].as_str().unwrap_or_default().to_owned();
+    let settings = [("READER", reader.trim())];
+    let told = page::play(&server, "changes.mjs", ["plant", "hall"], &settings).await?;
+    let said = &told.text;
+    let event = |name: &str| told.event(name);
+    let text = |name: &str, field: &str| told.words(name, field);
 
     assert!(text("unpublished", "text").contains("Nothing is published"), "{said}");
     assert_eq!(event("reader")["answers"], 0, "{said}");

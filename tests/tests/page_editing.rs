@@ -1,17 +1,14 @@
 //! The page's editor in headless Chromium against a real server: a room with a door is drawn by mouse, furnished, undone
 //! and redone, sent and published; a second operator's stale edit is refused without loss; robots get the corners.
 
-use std::path::Path;
-use std::process::Stdio;
-
 use mapfold_schema::route;
 use mapfold_schema::v1::{GdbCollection, GdbEntryPage, LandmarkKind, LandmarkTable, ObjectKind};
 use mapfold_tests::Error;
 use mapfold_tests::database::Database;
 use mapfold_tests::level::Level;
+use mapfold_tests::page;
 use mapfold_tests::server::Server;
-use serde_json::{Value, json};
-use tokio::process::Command;
+use serde_json::json;
 
 /// Where landmarks may lie from where they were drawn, metres: the grid of the model.
 const NEAR_M: f64 = 1e-5;
@@ -40,30 +37,11 @@ async fn the_page_draws_a_room_that_robots_then_know() -> Result<(), Error> {
     let reader = token(&["map:read"]).await?;
     let second = token(&["map:read", "map:edit"]).await?;
 
-    let web = Path::new(env!("CARGO_MANIFEST_DIR")).join("../web");
-    let output = Command::new("node")
-        .arg("e2e/editing.mjs")
-        .current_dir(&web)
-        .env("PAGE_URL", server.url())
-        .env("TOKEN", server.admin_token())
-        .env("SECOND", second)
-        .env("READER", reader)
-        .env("SITE", "plant")
-        .env("LEVEL", "ground")
-        .stdin(Stdio::null())
-        .output()
-        .await
-        .map_err(|e| Error::file(web.join("e2e/editing.mjs"), e))?;
-    let said = String::from_utf8_lossy(&output.stdout);
-    let complaint = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{}\n{said}{complaint}", output.status);
-    let events: Vec<Value> =
-        said.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
-    let event = |name: &str| {
-        let found = events.iter().find(|event| event["event"] == name);
-        found.cloned().unwrap_or_default()
-    };
-    let text = |name: &str, field: &str| event(name)[field].as_str().unwrap_or_default().to_owned();
+    let settings = [("SECOND", second.as_str()), ("READER", reader.as_str())];
+    let told = page::play(&server, "editing.mjs", ["plant", "ground"], &settings).await?;
+    let said = &told.text;
+    let event = |name: &str| told.event(name);
+    let text = |name: &str, field: &str| told.words(name, field);
 
     assert_eq!(event("reader")["editor"], false, "{said}");
     assert_eq!((&event("drawn")["objects"], &event("drawn")["unsent"]), (&json!(7), &json!(7)));

@@ -2,7 +2,6 @@
 //! taken out of the map and put back with the keyboard; who may not is not asked.
 
 use std::path::Path;
-use std::process::Stdio;
 
 use mapfold_schema::v1::RevertPage;
 use mapfold_schema::{codec, route};
@@ -11,9 +10,8 @@ use mapfold_tests::carmen::Log;
 use mapfold_tests::database::Database;
 use mapfold_tests::fleet;
 use mapfold_tests::level::Level;
+use mapfold_tests::page;
 use mapfold_tests::server::Server;
-use serde_json::Value;
-use tokio::process::Command;
 
 /// Scans that are played, a third by each of three robots.
 const SCANS: usize = 150;
@@ -33,30 +31,11 @@ async fn the_page_takes_contributions_out_and_puts_them_back() -> Result<(), Err
     let reader =
         server.command(&["token", "create", "--scope", "map:read", "--site", "mit"]).await?;
 
-    let web = Path::new(env!("CARGO_MANIFEST_DIR")).join("../web");
-    let output = Command::new("node")
-        .arg("e2e/reverts.mjs")
-        .current_dir(&web)
-        .env("PAGE_URL", server.url())
-        .env("TOKEN", server.admin_token())
-        .env("READER", reader.trim())
-        .env("SITE", "mit")
-        .env("LEVEL", "floor")
-        .env("ROBOT", fleet::NAMES[1])
-        .stdin(Stdio::null())
-        .output()
-        .await
-        .map_err(|e| Error::file(web.join("e2e/reverts.mjs"), e))?;
-    let said = String::from_utf8_lossy(&output.stdout);
-    let complaint = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{}\n{said}{complaint}", output.status);
-    let events: Vec<Value> =
-        said.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
-    let event = |name: &str| {
-        let found = events.iter().find(|event| event["event"] == name);
-        found.cloned().unwrap_or_default()
-    };
-    let text = |name: &str, field: &str| event(name)[field].as_str().unwrap_or_default().to_owned();
+    let settings = [("READER", reader.trim()), ("ROBOT", fleet::NAMES[1])];
+    let told = page::play(&server, "reverts.mjs", ["mit", "floor"], &settings).await?;
+    let said = &told.text;
+    let event = |name: &str| told.event(name);
+    let text = |name: &str, field: &str| told.words(name, field);
 
     assert_eq!(event("reader")["controls"], false, "{said}");
     assert!(text("reader", "text").contains("map:edit"), "{said}");

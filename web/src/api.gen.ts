@@ -3123,6 +3123,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description `plan_too_crowded`, `plan_too_large`: cut the level into smaller ones */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description Refused; `code` says why */
             default: {
                 headers: {

@@ -116,7 +116,8 @@ fn square(p: &Point) -> (i64, i64) {
     ((p.x / SQUARE).floor() as i64, (p.y / SQUARE).floor() as i64)
 }
 
-/// The squares that come near a surface, walked along it in steps of half a square.
+/// The squares that come near a surface, walked along it in steps of half a square: what is long and aslant comes near few of
+/// those that its bounds hold.
 fn touched(surface: &Surface) -> Vec<(i64, i64)> {
     let steps = (surface.length / (0.5 * SQUARE)).ceil().max(1.0) as u32;
     // Between two steps the surface is no farther than a quarter of a square from one of them.

@@ -7,7 +7,7 @@ use mapfold_schema::geojson;
 use super::args::{ContentName, ExportCommand, ExportFormat, StateName};
 use super::export::to_file;
 use super::import::refused;
-use super::import_building::unreadable;
+use super::import_draft::unreadable;
 use super::{CommandError, say};
 use crate::exchange::outgoing::Outgoing;
 use crate::exchange::{dxf, glb, jsonfg};

@@ -16,6 +16,7 @@ mod yaml;
 use std::collections::{BTreeMap, BTreeSet};
 
 use mapfold_schema::border::gdb::map_object;
+use mapfold_schema::digest;
 use mapfold_schema::v1::{BuildingReport, GdbObject};
 use sha2::{Digest, Sha256};
 use uuid::Uuid;
@@ -147,9 +148,7 @@ fn identity(frame: Uuid, building: &str, level: &str, key: &str) -> Uuid {
     for part in [building, level, key] {
         digest = digest.chain_update((part.len() as u64).to_le_bytes()).chain_update(part);
     }
-    let mut bytes = [0; 16];
-    bytes.copy_from_slice(&digest.finalize()[..16]);
-    uuid::Builder::from_custom_bytes(bytes).into_uuid()
+    digest::identity(&digest.finalize().into())
 }
 
 #[cfg(test)]

@@ -5,12 +5,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mapfold_map::gdb::{Model, Structure};
+use mapfold_map::gdb::{Kind, Model, Structure};
 use mapfold_schema::border::Violation;
 use mapfold_schema::border::gdb::{
     NAME_LENGTH_MAX, OBJECTS_MAX, PROTOTYPES_MAX, VERTICES_MAX, map_object, map_prototype,
     object_id, vertex_count,
 };
+use mapfold_schema::digest::{self, hexadecimal};
 use mapfold_schema::v1::{
     Bounds, GdbObject, GdbPrototype, KindCount, LeftOut, ModelFormat, ModelReport, ObjectKind,
 };
@@ -194,17 +195,10 @@ impl Found {
         new: &BTreeMap<String, GdbPrototype>,
         structure: &Structure,
     ) -> ModelReport {
-        let kinds = [
-            ObjectKind::Wall,
-            ObjectKind::Doorway,
-            ObjectKind::Corridor,
-            ObjectKind::Machine,
-            ObjectKind::Furniture,
-            ObjectKind::Other,
-        ];
         let count =
             |kind| self.objects.values().filter(|object| object.kind == kind).count() as u32;
-        let kinds = kinds.map(|kind| KindCount { kind, count: count(kind) });
+        let kinds =
+            Kind::ALL.map(ObjectKind::from).map(|kind| KindCount { kind, count: count(kind) });
         let left_out = std::mem::take(&mut self.left_out);
         ModelReport {
             format: self.format,
@@ -263,9 +257,7 @@ impl Found {
             .chain_update(self.digest)
             .chain_update(place)
             .finalize();
-        let mut bytes = [0; 16];
-        bytes.copy_from_slice(&digest[..16]);
-        uuid::Builder::from_custom_bytes(bytes).into_uuid()
+        digest::identity(&digest.into())
     }
 }
 
@@ -287,7 +279,7 @@ pub(super) fn short_name(name: &str) -> String {
 fn other_name(name: &str, prototype: &GdbPrototype) -> String {
     let content = serde_json::to_vec(prototype).unwrap_or_default();
     let digest = Sha256::digest(&content);
-    let suffix = format!("~{:02x}{:02x}{:02x}{:02x}", digest[0], digest[1], digest[2], digest[3]);
+    let suffix = format!("~{}", hexadecimal(&digest[..4]));
     let mut other = name.to_owned();
     while other.len() + suffix.len() > NAME_LENGTH_MAX {
         other.pop();

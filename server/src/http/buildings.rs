@@ -9,13 +9,12 @@ use mapfold_schema::v1::BuildingImport;
 
 use super::access::{Edit, LevelFor};
 use super::answer::{Reader, blocking};
-use super::gdb::{Asked, answer, columns, concluded, new_entry, tell};
+use super::gdb::{answer, concluded, new_entry, tell};
 use super::preconditions::IfMatch;
 use super::problem::ApiError;
 use super::state::App;
 use crate::auth;
 use crate::exchange::building::Document;
-use crate::store::gdb::{Expected, GdbChange};
 
 /// What YAML is sent as.
 const YAML: [&str; 3] = ["application/yaml", "application/x-yaml", "text/yaml"];
@@ -45,29 +44,21 @@ pub(super) async fn take(
     headers: &HeaderMap,
     bytes: Bytes,
 ) -> Result<Response, ApiError> {
-    let if_match = IfMatch::of(headers);
-    let expected = if if_match.is_absent() { Expected::Any } else { if_match.versions()? };
+    let expected = IfMatch::of(headers).versions_if_any()?;
     let state = level.level.gdb_state().await?;
     let draft = level.level.gdb_model(state.draft).await?;
     let frame = level.level.frame();
     let Taking { preview, building_level, replace } = taking;
     let _turn = app.exports.acquire().await.ok().ok_or(ApiError::Closing)?;
-    let (report, asked, preview) = blocking(move || {
+    let (report, change, preview) = blocking(move || {
         let prototypes: BTreeSet<&str> = draft.library().keys().map(String::as_str).collect();
         let document = Document::read(&bytes).map_err(ApiError::Building)?;
         let imported = document.import(building_level.as_deref(), frame, &prototypes);
         let imported = imported.map_err(ApiError::Building)?;
-        let put = columns(&imported.objects)?;
-        let (after, change) = if replace {
-            (imported.objects, GdbChange::Replace(put))
-        } else {
-            let mut after = draft.objects().clone();
-            after.extend(imported.objects);
-            (after, GdbChange::Edit { put, removed: BTreeSet::new() })
-        };
-        let model = draft.with_objects(after.clone())?;
+        let (after, change) = draft.taking(imported.objects, replace)?;
+        let model = draft.with_objects(after)?;
         let told = preview.then(|| tell(&draft, &model));
-        Ok((imported.report, Asked { after, change, named: BTreeMap::new() }, told))
+        Ok((imported.report, change, told))
     })
     .await?;
     if preview.is_some() {
@@ -76,10 +67,8 @@ pub(super) async fn take(
     let comment = format!("{} of {}", report.building_level, report.building);
     let comment: String = comment.chars().filter(|c| !c.is_control()).take(120).collect();
     let new = new_entry(app, auth::granted_by(&level.caller), &comment, expected);
-    let outcome = level.level.edit_gdb(&new, &asked.change).await?;
-    answer(reader, concluded(outcome, asked.named)?, StatusCode::CREATED, |answer| BuildingImport {
-        report,
-        preview: None,
-        answer: Some(answer),
+    let outcome = level.level.edit_gdb(&new, &change).await?;
+    answer(reader, concluded(outcome, BTreeMap::new())?, StatusCode::CREATED, |answer| {
+        BuildingImport { report, preview: None, answer: Some(answer) }
     })
 }

@@ -18,14 +18,14 @@ use super::access::{Edit, LevelFor, Read};
 use super::answer::Reader;
 use super::body::Payload;
 use super::check;
-use super::gdb::{columns, concluded, new_entry};
+use super::gdb::{concluded, new_entry};
 use super::plan::height;
 use super::problem::ApiError;
 use super::query::QueryOf;
 use super::state::App;
 use crate::auth;
 use crate::level::changes::{Changes, Details, accepting, is_in_draft};
-use crate::level::gdb::GdbModel;
+use crate::level::gdb::{GdbModel, columns};
 use crate::level::{LevelHandle, Snapshot};
 use crate::store::gdb::{Expected, GdbChange, Publication};
 
@@ -90,7 +90,10 @@ impl Held {
 #[utoipa::path(
     get, path = route::CHANGES, operation_id = "read_changes", tag = "gdb",
     params(("site" = String, Path), ("level" = String, Path), ChangesQuery),
-    responses((status = 200, body = ModelChanges, description = "The changes"))
+    responses(
+        (status = 200, body = ModelChanges, description = "The changes"),
+        (status = 409, description = "`plan_too_crowded`, `plan_too_large`: cut the level into smaller ones"),
+    )
 )]
 pub(super) async fn read(
     State(app): State<App>,

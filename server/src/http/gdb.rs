@@ -31,7 +31,7 @@ use super::query::{QueryOf, before, page_limit};
 use super::state::App;
 use crate::auth;
 use crate::level::LevelHandle;
-use crate::level::gdb::{GdbModel, WireObjects, column};
+use crate::level::gdb::{GdbModel, WireObjects, columns};
 use crate::store::gdb::{Expected, GdbChange, GdbOutcome, GdbState, GdbVersion, NewGdbEntry};
 
 /// Entries of a page, if the request names no number; and at most.
@@ -216,13 +216,13 @@ pub(super) async fn edit(
 }
 
 /// What a body asks for.
-pub(super) struct Asked {
+struct Asked {
     /// The objects of the draft as they would be.
-    pub(super) after: WireObjects,
+    after: WireObjects,
     /// The change.
-    pub(super) change: GdbChange,
+    change: GdbChange,
     /// Where in the body each object stands.
-    pub(super) named: BTreeMap<Uuid, String>,
+    named: BTreeMap<Uuid, String>,
 }
 
 /// A body that asks for a change of the draft.
@@ -256,10 +256,6 @@ impl Asks for GdbEdit {
         after.extend(checked.put);
         Ok(Asked { after, change: GdbChange::Edit { put, removed: checked.removed }, named })
     }
-}
-
-pub(super) fn columns(objects: &WireObjects) -> Result<BTreeMap<Uuid, Vec<u8>>, ApiError> {
-    objects.iter().map(|(id, object)| Ok((*id, column(object)?))).collect()
 }
 
 async fn change<T: Asks>(

@@ -1,6 +1,6 @@
 //! `L/imports` for models of other programs: objects into the draft of the GDB, prototypes into the site's library.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::Response;
@@ -10,7 +10,7 @@ use uuid::Uuid;
 
 use super::access::{Edit, LevelFor};
 use super::answer::{Reader, blocking};
-use super::gdb::{answer, columns, concluded, new_entry, tell};
+use super::gdb::{answer, concluded, new_entry, tell};
 use super::preconditions::IfMatch;
 use super::problem::ApiError;
 use super::problem::gdb::GdbRefusal;
@@ -18,8 +18,8 @@ use super::state::App;
 use crate::auth;
 use crate::exchange::incoming::{FileFault, Incoming};
 use crate::exchange::{dxf, glb, jsonfg};
-use crate::level::gdb::{WireLibrary, column};
-use crate::store::gdb::{Expected, GdbChange, GdbVersion};
+use crate::level::gdb::{WireLibrary, columns};
+use crate::store::gdb::{Expected, GdbVersion};
 use crate::store::library::LibraryOutcome;
 
 /// What models are sent as.
@@ -54,8 +54,7 @@ pub(super) async fn take(
     headers: &HeaderMap,
     read: impl FnOnce(Uuid, &WireLibrary) -> Result<Incoming, FileFault> + Send + 'static,
 ) -> Result<Response, ApiError> {
-    let if_match = IfMatch::of(headers);
-    let expected = if if_match.is_absent() { Expected::Any } else { if_match.versions()? };
+    let expected = IfMatch::of(headers).versions_if_any()?;
     let state = level.level.gdb_state().await?;
     let draft = level.level.gdb_model(state.draft).await?;
     let frame = level.level.frame();
@@ -64,19 +63,11 @@ pub(super) async fn take(
     let (report, library, change, told) = blocking(move || {
         let Incoming { objects, prototypes, report } =
             read(frame, draft.library()).map_err(ApiError::ModelFile)?;
-        let put = columns(&objects)?;
-        let (after, change) = if replace {
-            (objects, GdbChange::Replace(put))
-        } else {
-            let mut after = draft.objects().clone();
-            after.extend(objects);
-            (after, GdbChange::Edit { put, removed: BTreeSet::new() })
-        };
+        let (after, change) = draft.taking(objects, replace)?;
         let mut library = draft.library().clone();
         let grows = !prototypes.is_empty();
         library.extend(prototypes);
-        let columns = library.iter().map(|(name, p)| Ok((name.clone(), column(p)?)));
-        let columns = columns.collect::<Result<BTreeMap<_, _>, ApiError>>()?;
+        let columns = columns(&library)?;
         // Also to see that it is not too large.
         let model = draft.with_library(after, library)?;
         let told = preview.then(|| tell(&draft, &model));

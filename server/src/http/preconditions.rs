@@ -31,9 +31,9 @@ impl IfMatch {
         Self((!texts.is_empty()).then(|| texts.join(",")))
     }
 
-    /// Whether the client does not say.
-    pub(super) fn is_absent(&self) -> bool {
-        self.0.is_none()
+    /// The versions of the GDB that may be there; any if the client does not say.
+    pub(super) fn versions_if_any(&self) -> Result<Expected, ApiError> {
+        if self.0.is_none() { Ok(Expected::Any) } else { self.versions() }
     }
 
     /// The versions of the GDB that may be there.

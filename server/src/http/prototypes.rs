@@ -1,7 +1,5 @@
 //! `/sites/{site}/prototypes`: the library of a site.
 
-use std::collections::BTreeMap;
-
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::Response;
@@ -18,7 +16,7 @@ use super::problem::ApiError;
 use super::problem::gdb::GdbRefusal;
 use super::state::App;
 use crate::auth;
-use crate::level::gdb::{WireLibrary, column, library};
+use crate::level::gdb::{WireLibrary, columns, library};
 use crate::store::gdb::Expected;
 use crate::store::library::LibraryOutcome;
 
@@ -84,8 +82,7 @@ pub(super) async fn replace(
     let (wire, columns) = blocking(move || {
         let collection: PrototypeCollection = decode(&sent, &bytes)?;
         let wire = check_library(&collection).map_err(ApiError::Invalid)?;
-        let columns = wire.iter().map(|(name, p)| Ok((name.clone(), column(p)?)));
-        let columns = columns.collect::<Result<BTreeMap<_, _>, ApiError>>()?;
+        let columns = columns(&wire)?;
         Ok((wire, columns))
     })
     .await?;

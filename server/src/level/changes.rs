@@ -7,6 +7,7 @@ use mapfold_map::changes::{Change, ChangeConfig, ChangeId, Stretch, What, change
 use mapfold_map::geometry::{Level, Point, Pose};
 use mapfold_schema::border::changes::change_id;
 use mapfold_schema::border::gdb::object_uuid;
+use mapfold_schema::digest;
 use mapfold_schema::v1::{GdbObject, GdbPlacement, GdbPrism, GdbSolid, ObjectKind};
 use sha2::{Digest, Sha256};
 use uuid::Uuid;
@@ -102,7 +103,7 @@ impl LevelHandle {
             let map = snapshot.map();
             Ok(model.plan(height_m, |plan| changes(plan, &map, &config)))
         });
-        let named = said.await??.into_iter().map(|(id, change)| (change_id(&id), change));
+        let named = said.await???.into_iter().map(|(id, change)| (change_id(&id), change));
         let found = Arc::new(named.collect());
         kept.put(key, &found);
         Ok(found)
@@ -170,10 +171,7 @@ pub fn accepting(
 
 /// An identity made of a name: the same each time, so that accepting twice is accepting once.
 fn derived(name: &str) -> Uuid {
-    let digest = Sha256::digest(name);
-    let mut bytes = [0; 16];
-    bytes.copy_from_slice(&digest[..16]);
-    uuid::Builder::from_custom_bytes(bytes).into_uuid()
+    digest::identity(&Sha256::digest(name).into())
 }
 
 fn new_object(change: &Change) -> Uuid {

@@ -3,9 +3,10 @@
 //! A model is known by its version (draft and library), and never changes. The fold does not read it: its entries only
 //! take their places in the log.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use mapfold_map::changes::TooMuchSurface;
 use mapfold_map::gdb::{
     Finding, Landmark, LandmarkConfig, Model, Plan, PriorError, PrototypeName, Shape, Structure,
     TooCrowded, findings, landmarks,
@@ -14,6 +15,7 @@ use mapfold_schema::border::Violation;
 use mapfold_schema::border::gdb::{
     OBJECTS_MAX, VERTICES_MAX, map_object, map_prototype, object_id, vertex_count,
 };
+use mapfold_schema::codec::EncodeError;
 use mapfold_schema::{codec, v1};
 use uuid::Uuid;
 
@@ -53,6 +55,9 @@ pub enum GdbError {
     /// There is no raster of it.
     #[error(transparent)]
     NoPrior(#[from] PriorError),
+    /// It has too much surface to be held against a map.
+    #[error(transparent)]
+    TooMuchSurface(#[from] TooMuchSurface),
 }
 
 /// Objects as they travel, by identity.
@@ -146,6 +151,25 @@ impl GdbModel {
         library: WireLibrary,
     ) -> Result<Self, GdbError> {
         Self::new(self.version, objects, Arc::new(library))
+    }
+
+    /// What taking objects in would make of this draft: its objects then, and the change that does it. With `replace`
+    /// they are all that it holds.
+    ///
+    /// # Errors
+    /// An object that CBOR cannot hold (none that was decoded).
+    pub fn taking(
+        &self,
+        objects: WireObjects,
+        replace: bool,
+    ) -> Result<(WireObjects, GdbChange), EncodeError> {
+        let put = columns(&objects)?;
+        if replace {
+            return Ok((objects, GdbChange::Replace(put)));
+        }
+        let mut after = self.objects.clone();
+        after.extend(objects);
+        Ok((after, GdbChange::Edit { put, removed: BTreeSet::new() }))
     }
 
     /// Which model it is.
@@ -300,12 +324,14 @@ pub(crate) async fn check_entry(
     aside(move || rows.into_iter().try_for_each(object)).await
 }
 
-/// An object's column.
+/// The columns of objects, or of a library.
 ///
 /// # Errors
-/// CBOR cannot hold it (none that was decoded).
-pub fn column<T: serde::Serialize>(value: &T) -> Result<Vec<u8>, codec::EncodeError> {
-    codec::to_cbor(value)
+/// CBOR cannot hold one (none that was decoded).
+pub fn columns<K: Ord + Clone, T: serde::Serialize>(
+    things: &BTreeMap<K, T>,
+) -> Result<BTreeMap<K, Vec<u8>>, EncodeError> {
+    things.iter().map(|(name, thing)| Ok((name.clone(), codec::to_cbor(thing)?))).collect()
 }
 
 impl LevelHandle {

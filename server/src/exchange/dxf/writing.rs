@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use mapfold_map::gdb::{Placement, Point3, Shape, Solid};
+use mapfold_map::gdb::{Kind, Placement, Point3, Shape, Solid};
 use mapfold_map::geometry::Point;
-use mapfold_schema::v1::{GdbObject, ObjectKind};
+use mapfold_schema::v1::GdbObject;
 use uuid::Uuid;
 
 use super::super::affine::Affine;
@@ -136,17 +136,9 @@ impl<W: Write> Writer<'_, W> {
         self.section("HEADER")?;
         self.texts(&[(9, "$ACADVER"), (1, "AC1009"), (9, "$INSUNITS"), (70, "6"), (0, "ENDSEC")])?;
         self.section("TABLES")?;
-        let kinds = [
-            ObjectKind::Wall,
-            ObjectKind::Doorway,
-            ObjectKind::Corridor,
-            ObjectKind::Machine,
-            ObjectKind::Furniture,
-            ObjectKind::Other,
-        ];
         self.texts(&[(0, "TABLE"), (2, "LAYER"), (70, "6")])?;
-        for (kind, colour) in kinds.into_iter().zip(["7", "3", "8", "5", "30", "9"]) {
-            let layer = [(0, "LAYER"), (2, layer_of(kind)), (70, "0"), (62, colour)];
+        for (kind, colour) in Kind::ALL.into_iter().zip(["7", "3", "8", "5", "30", "9"]) {
+            let layer = [(0, "LAYER"), (2, layer_of(kind.into())), (70, "0"), (62, colour)];
             self.texts(&layer)?;
             self.text(6, "CONTINUOUS")?;
         }

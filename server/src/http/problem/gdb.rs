@@ -75,6 +75,7 @@ pub(super) fn problem(refusal: &GdbRefusal) -> Problem {
                 GdbError::TooLarge { .. } => of(422, "gdb_too_large", detail),
                 GdbError::TooCrowded(_) => of(409, "plan_too_crowded", detail),
                 GdbError::NoPrior(_) => of(409, "prior_too_large", detail),
+                GdbError::TooMuchSurface(_) => of(409, "plan_too_large", detail),
                 GdbError::Store(error) => of_store(error),
             }
         }
