@@ -11,12 +11,14 @@
 //! * [`emulation`]: a ring of sonars out of a scanner, for demonstrations.
 //! * [`geojson`]: features of scans, for looking at.
 //! * [`robot`]: the surveyor, which makes contributions of readings.
+//! * [`localization`]: where the robot is while it drives.
 //! * [`sync`]: the outbox, the upload, the mirror of the shared map.
 //! * [`replay`]: a log played against a server as the robot would have lived it.
 
 pub mod emulation;
 pub mod evidence;
 pub mod geojson;
+pub mod localization;
 pub mod log;
 pub mod perception;
 pub mod replay;

@@ -29,6 +29,12 @@ impl OdometryNoise {
         turn_per_metre: std::f64::consts::PI / 180.0,
         turn_per_turn: 1.5 * std::f64::consts::PI / 180.0,
     };
+
+    /// A step that the wheels counted, with what it adds to the covariance, in the frame in which it began.
+    #[must_use]
+    pub fn of_step(&self, step: &Pose<Robot, Robot>) -> UncertainPose<Robot, Robot> {
+        UncertainPose { pose: *step, covariance: step_covariance(step, self) }
+    }
 }
 
 /// A pose that is carried on.
@@ -54,8 +60,7 @@ impl DeadReckoning {
             None => start(),
             Some((odom_then, level_then)) => {
                 let step: Pose<Robot, Robot> = odom_then.inverse().compose(&odom_from_robot);
-                let covariance = step_covariance(&step, &self.noise);
-                level_then.compose(&UncertainPose { pose: step, covariance })
+                level_then.compose(&self.noise.of_step(&step))
             }
         };
         self.last = Some((odom_from_robot, now));

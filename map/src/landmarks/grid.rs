@@ -62,7 +62,7 @@ impl Grid {
     }
 
     /// The numbers of all places within `reach` metres of `p` (and of some more), square by square.
-    pub(super) fn near(&self, p: &Point, reach: f64) -> impl Iterator<Item = u32> + '_ {
+    pub(super) fn near<'a>(&'a self, p: &Point, reach: f64) -> impl Iterator<Item = u32> + use<'a> {
         let clip =
             |v: f64, low: i64, count: i64| ((v / self.side).floor() as i64 - low).clamp(-1, count);
         let (column_from, column_to, row_from, row_to) = if self.numbers.is_empty() {

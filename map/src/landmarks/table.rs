@@ -45,6 +45,13 @@ impl LandmarkTable {
         &self.landmarks
     }
 
+    /// Those within `reach` metres of a place, with their numbers, in no order that means anything.
+    pub fn near(&self, at: Point, reach: f64) -> impl Iterator<Item = (u32, &Landmark)> {
+        let all = self.grid.near(&at, reach);
+        let numbered = all.map(|number| (number, &self.landmarks[number as usize]));
+        numbered.filter(move |(_, l)| (l.at - at).norm_squared() <= reach * reach)
+    }
+
     /// Number of pairs.
     pub fn pair_count(&self) -> usize {
         self.pairs.len()

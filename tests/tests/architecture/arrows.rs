@@ -96,6 +96,8 @@ const MODULES: &[(&str, &[ModuleRule])] = &[
             ("sync", &[]),
             ("geojson", &["perception"]),
             ("robot", &["emulation", "evidence", "log", "perception", "sensor"]),
+            // Of emulation its chance only, for unit tests.
+            ("localization", &["emulation::Chance", "robot::OdometryNoise", "sensor"]),
             ("replay", &["log", "robot", "sensor", "sync"]),
             ("cli", &["geojson", "log", "perception", "replay", "robot", "sensor", "sync"]),
         ],

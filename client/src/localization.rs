@@ -1,0 +1,43 @@
+//! Where the robot is while it drives: its pose carried on by the wheels and held against walls and landmarks
+//! that are known, those of the shared map or of the plan of the a-priori model.
+//!
+//! [`ReferenceWalls`] are what looks are held against, found by place. [`Tracker`] is an extended Kalman filter on
+//! the pose that starts from a fix (`mapfold_map::landmarks::locate`, say) and says when it no longer knows:
+//! [`Tracking::Lost`]. Who drives it:
+//!
+//! ```
+//! use mapfold_client::localization::{ReferenceWalls, Tracker, TrackerConfig, Tracking};
+//! use mapfold_map::geometry::{Covariance, Pose, UncertainPose};
+//! use mapfold_map::level::LevelMap;
+//! # let (map, segments) = (LevelMap::default(), Vec::new());
+//!
+//! let walls = ReferenceWalls::of_map(&map);
+//! let fix = UncertainPose {
+//!     pose: Pose::new(3.0, 2.0, 0.1),
+//!     covariance: Covariance::from_variances([4e-4, 4e-4, 1e-4]),
+//! };
+//! let mut tracker = Tracker::new(fix, TrackerConfig::STANDARD);
+//! tracker.moved(&Pose::new(0.4, 0.0, 0.02)); // what the wheels counted since, in the robot's own frame
+//! let report = tracker.seen(&segments, &walls, None); // what perception made of a scan
+//! match tracker.state() {
+//!     Tracking::Tracked(level_from_robot) => println!("{level_from_robot:?}, {} walls", report.walls.len()),
+//!     Tracking::Lost(why) => println!("lost: {why:?}"), // find a fix anew, and start a new tracker from it
+//! }
+//! ```
+//!
+//! Knows no scans, no server and no grid.
+
+mod filter;
+mod landmarks;
+mod lines;
+mod reference_walls;
+mod sonar;
+#[cfg(test)]
+mod tests;
+mod tracker;
+mod watchdog;
+
+pub use filter::WallName;
+pub use reference_walls::{ReferenceWalls, ReferenceWallsConfig};
+pub use tracker::{TrackReport, Tracker, TrackerConfig};
+pub use watchdog::{Lost, Tracking, WatchdogConfig};
