@@ -37,7 +37,7 @@ pub use arrangement::PlanWork;
 pub use exact::{MICROMETRES, PlanPoint};
 pub use findings::{Finding, FindingKind, Place, Severity, findings};
 pub use footprint::{Footprint, footprints};
-pub use landmark::{Landmark, LandmarkConfig, LandmarkId, landmarks};
+pub use landmark::{LandmarkConfig, LandmarkId, PlannedLandmark, landmarks};
 pub use model::{Kind, Model, Object, ObjectId, Prototype, PrototypeName, Shape};
 pub use placement::{Placement, Point3};
 pub use plan::{Edge, Free, Opening, OpeningSide, Outline, Owner, Plan, Sheet, TooCrowded};

@@ -9,7 +9,7 @@ mod model;
 
 use std::io::{self, Write};
 
-use mapfold_map::gdb::{Landmark, Plan};
+use mapfold_map::gdb::{Plan, PlannedLandmark};
 use mapfold_map::geometry::Line;
 use mapfold_map::level::LevelMap;
 use serde::Serialize;
@@ -100,7 +100,7 @@ pub fn write_map(map: &LevelMap, to: &mut impl Write) -> io::Result<()> {
 /// What `to` cannot take.
 pub fn write(
     map: Option<&LevelMap>,
-    model: Option<(&Plan, &[Landmark])>,
+    model: Option<(&Plan, &[PlannedLandmark])>,
     to: &mut impl Write,
 ) -> io::Result<()> {
     let mut features = Features::begin(to, "")?;

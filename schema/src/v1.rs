@@ -54,8 +54,8 @@ pub use patch::{
     Patch, PriorTile, RasterChanges, Removed, TileAddress, TileEvidence, TilePlace, VectorPatch,
 };
 pub use plan::{
-    GdbPlan, Landmark, LandmarkKind, LandmarkSource, LandmarkTable, PlanCorner, PlanObject,
-    PlanOpening, PlanOpeningSide,
+    GdbPlan, Landmark, LandmarkKind, LandmarkSource, LandmarkSupport, LandmarkTable, PlanCorner,
+    PlanObject, PlanOpening, PlanOpeningSide,
 };
 pub use receipt::{Receipt, UploadAnswer};
 pub use revert::{

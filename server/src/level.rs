@@ -14,6 +14,7 @@ pub(crate) mod folding;
 pub mod gdb;
 mod gdb_prior;
 mod history;
+pub mod learned;
 mod open;
 pub(crate) mod prior;
 pub(crate) mod recall;
@@ -48,6 +49,7 @@ use crate::store::{Store, StoreError};
 use append::Waiting;
 use changes::ChangeCache;
 use gdb::ModelCache;
+use learned::LearnedCache;
 use registry::DiskAlarm;
 use trial::Trial;
 
@@ -112,6 +114,8 @@ struct Shared {
     models: ModelCache,
     /// What the map says against them.
     changes: ChangeCache,
+    /// Landmarks that the map teaches.
+    learned: LearnedCache,
     store: Store,
     alarm: DiskAlarm,
 }

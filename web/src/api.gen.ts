@@ -415,8 +415,11 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * The landmarks of the published model at a sensor's height: corners, free ends and doorways, each with
-         *     its direction and covariance; or what changed of them.
+         * Landmarks at a sensor's height: corners, free ends and doorways, each with its direction and covariance; or what
+         *     changed of them.
+         * @description Those of the published model, and those that robots taught (`source: learned`), which three looks or more support and the
+         *     model does not have within the errors of both. A learned one changes with the looks that support it, and goes when its
+         *     walls go, when the model gets it, and when its contributions are reverted.
          */
         get: operations["read_landmarks"];
         put?: never;
@@ -1634,6 +1637,7 @@ export interface components {
             objects: string[];
             /** @description Where it is known from. */
             source: components["schemas"]["LandmarkSource"];
+            support?: components["schemas"]["LandmarkSupport"] | null;
         };
         /**
          * @description Kinds of landmarks.
@@ -1645,6 +1649,16 @@ export interface components {
          * @enum {string}
          */
         LandmarkSource: "gdb" | "learned";
+        /** @description Who bears out a landmark that robots saw. */
+        LandmarkSupport: {
+            /**
+             * Format: int32
+             * @description Quality: distinct looks at the least seen of its walls.
+             */
+            looks: number;
+            /** @description Who saw any of its walls, ascending. */
+            robots: string[];
+        };
         /** @description `GET L/landmarks`: those that changed, or all of them. */
         LandmarkTable: {
             /**
@@ -4237,7 +4251,7 @@ export interface operations {
                 };
                 content?: never;
             };
-            /** @description `cursor_expired`: `since` is ahead of the log; read from 0 */
+            /** @description `cursor_expired`: `since` is ahead of the log, or what was told then is not known any more (after a restart, or by another replica); read from 0 */
             410: {
                 headers: {
                     [name: string]: unknown;

@@ -107,8 +107,8 @@ export interface Api {
   publishModel: (place: Place, version: { draft: number; library: number }) => Promise<GdbAnswer>;
   /** What a sensor at a height would see of it. */
   plan: (place: Place, view: ModelView, signal: AbortSignal) => Promise<GdbPlan>;
-  /** Its landmarks at a height, as it is published. */
-  landmarks: (place: Place, heightM: number, signal: AbortSignal) => Promise<LandmarkTable>;
+  /** Landmarks at a height, those of what is published and those that robots taught; what changed of them after a revision. */
+  landmarks: (place: Place, heightM: number, since: number, signal: AbortSignal) => Promise<LandmarkTable>;
   /** What robots found against what is published, cut at a height. */
   changes: (place: Place, heightM: number) => Promise<ModelChanges>;
   /** What is to become of one of them. */
@@ -241,7 +241,7 @@ export function createApi(browser: Browser): Api {
       askJson(`${levelPath(place)}/gdb/publications`, { method: "POST", headers: { "if-match": `"${draft}.${library}"` } }),
     plan: (place, { heightM, state }, signal) =>
       askJson(`${levelPath(place)}/gdb/plan?height_m=${heightM}&state=${state}`, { signal }),
-    landmarks: (place, heightM, signal) => askJson(`${levelPath(place)}/landmarks?height_m=${heightM}`, { signal }),
+    landmarks: (place, heightM, since, signal) => askJson(`${levelPath(place)}/landmarks?height_m=${heightM}&since=${since}`, { signal }),
     changes: (place, heightM) => askJson(`${levelPath(place)}/changes?height_m=${heightM}`),
     answerChange: (place, id, answer, heightM) =>
       askJson(`${levelPath(place)}/changes/${encodeURIComponent(id)}?height_m=${heightM}`, posted({ answer })),

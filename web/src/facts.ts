@@ -8,7 +8,8 @@
 //   data-pieces-painted   straight pieces of them that are on the screen
 //   data-clusters, data-chains, data-robots
 //   data-model            height and corners of the plan of the a-priori model; empty without one
-//   data-landmarks        landmarks of the published model
+//   data-landmarks        landmarks, those of the published model and those that robots taught
+//   data-learned          of them, those that robots taught
 //   data-tiles            tiles that hold evidence
 //   data-tiles-loaded     pictures of the raster that are loaded
 //   data-tiles-pending    pictures on the screen that are missing or stale
@@ -34,6 +35,7 @@ export function createFacts(root: HTMLElement): Facts {
   const tiles = memo(tileCount);
   const plan = memo((shown: GdbPlan | null) => (shown === null ? "" : `${shown.height_m} ${cornersOf(shown).length}`));
   const unsents = memo(unsentCount);
+  const learned = memo((landmarks: State["model"]["landmarks"]) => [...landmarks.values()].filter(({ source }) => source === "learned").length);
   const say = (name: string, value: string | number): void => {
     const text = String(value);
     if (root.dataset[name] !== text) root.dataset[name] = text;
@@ -46,6 +48,7 @@ export function createFacts(root: HTMLElement): Facts {
       say("live", link.kind);
       say("model", plan(model.plan));
       say("landmarks", model.landmarks.size);
+      say("learned", learned(model.landmarks));
       // What is drawn of the draft, and what of it is not sent; empty while nobody edits.
       say("objects", editing.copy?.now.size ?? "");
       say("unsent", editing.copy === null ? "" : unsents(editing));

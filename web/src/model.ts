@@ -1,7 +1,7 @@
 // What the page knows of the a-priori model (GDB): its plan at one height, and its landmarks. Pure.
 
 import { union, type Box } from "./geometry";
-import type { GdbPlan, Landmark, LandmarkKind, PlanCorner } from "./wire";
+import type { GdbPlan, Landmark, LandmarkKind, LandmarkTable, PlanCorner } from "./wire";
 
 /** Which model is shown: what robots have, or what is being edited. */
 export const MODEL_STATES = ["published", "draft"] as const;
@@ -23,8 +23,10 @@ export interface ModelState {
   readAs: ModelView | null;
   /** Null if there is none. */
   plan: GdbPlan | null;
-  /** Of what is published. */
+  /** Of what is published, and those that robots taught. */
   landmarks: ReadonlyMap<string, Landmark>;
+  /** The revision of the level that they were told at; null before. */
+  told: number | null;
   problem: string | null;
 }
 
@@ -35,6 +37,7 @@ export const NO_MODEL: ModelState = {
   readAs: null,
   plan: null,
   landmarks: new Map(),
+  told: null,
   problem: null,
 };
 
@@ -44,6 +47,14 @@ export const HEIGHTS_M = { min: 0, max: 20, step: 0.05 } as const;
 /** Whether what was read is what is asked for, the newest entry being `revision`. */
 export function isRead(model: ModelState, revision: number): boolean {
   return model.revision === revision && model.readAs === model.view;
+}
+
+/** Landmarks after a table of what changed since they were told; whole, if nothing was. */
+export function withTable(known: ReadonlyMap<string, Landmark>, table: LandmarkTable): Pick<ModelState, "landmarks" | "told"> {
+  const landmarks = new Map(known);
+  for (const id of table.removed) landmarks.delete(id);
+  for (const landmark of table.landmarks) landmarks.set(landmark.id, landmark);
+  return { landmarks, told: table.revision };
 }
 
 /** All corners of a plan. */

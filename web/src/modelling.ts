@@ -1,9 +1,9 @@
 // Follows the a-priori model: after the level has changed, asks whether its model has, and only then for
-// the plan and the landmarks.
+// the plan. Landmarks follow the map too, for robots teach some.
 
 import { inWords, isAborted, Refused, type Api } from "./api";
 import { createCoalescer, type Timers } from "./coalesce";
-import { isRead, type ModelState } from "./model";
+import { isRead, withTable, type ModelState } from "./model";
 import type { Place } from "./permalink";
 import { samePlace, type State } from "./state";
 import type { Dispatch } from "./store";
@@ -32,6 +32,19 @@ export function followModel({ place, api, state, dispatch, timers }: ModelFollow
     if (!signal.aborted && samePlace(place, state().place)) dispatch({ kind: "model", model });
   };
 
+  const followLandmarks = async (): Promise<void> => {
+    const { model, layers, level } = state();
+    const { told, view, landmarks } = model;
+    if (!layers.landmarks.on || told === null || (level?.revision ?? 0) <= told) return;
+    try {
+      tell(withTable(landmarks, await api.landmarks(place, view.heightM, told, signal)));
+    } catch (error) {
+      // The server does not know any more what it told: all of it, then.
+      if (!(error instanceof Refused && error.status === 410)) throw error;
+      tell(withTable(new Map(), await api.landmarks(place, view.heightM, 0, signal)));
+    }
+  };
+
   const looking = createCoalescer({
     intervalMs: INTERVAL_MS,
     timers,
@@ -39,16 +52,14 @@ export function followModel({ place, api, state, dispatch, timers }: ModelFollow
       try {
         const newest = (await api.modelEntries(place, 1, signal)).entries.at(0)?.revision ?? 0;
         const { view } = state().model;
-        if (isRead(state().model, newest)) return;
-        if (newest === 0) {
-          tell({ revision: 0, readAs: view, plan: null, landmarks: new Map(), problem: null });
+        if (isRead(state().model, newest)) {
+          await followLandmarks();
           return;
         }
-        const table = await api.landmarks(place, view.heightM, signal);
-        const isThere = view.state === "draft" || table.publication > 0;
+        const table = await api.landmarks(place, view.heightM, 0, signal);
+        const isThere = newest > 0 && (view.state === "draft" || table.publication > 0);
         const plan = isThere ? await api.plan(place, view, signal) : null;
-        const landmarks = new Map(table.landmarks.map((landmark) => [landmark.id, landmark]));
-        tell({ revision: newest, readAs: view, plan, landmarks, problem: null });
+        tell({ revision: newest, readAs: view, plan, ...withTable(new Map(), table), problem: null });
         // Another height may have been chosen meanwhile.
         if (state().model.view !== view) looking.request();
       } catch (error) {

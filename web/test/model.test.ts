@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { boundsOfPlan, isRead, NO_MODEL } from "../src/model";
+import { boundsOfPlan, isRead, NO_MODEL, withTable } from "../src/model";
 import { pick } from "../src/pick";
 import { describe as inWords } from "../src/panels/selection_card";
 import { update, type State } from "../src/state";
@@ -37,6 +37,17 @@ describe("the a-priori model", () => {
     // Lines and landmarks are met within 8 pixels: 20 cm.
     expect(pick(withModel(), [28.1, 1.4], 0.025)).toEqual({ kind: "landmark", id: "end" });
     expect(pick(withModel(), [28.1, 1.1], 0.025)?.kind).not.toBe("landmark");
+  });
+
+  it("follows what changes of the landmarks, and tells those that robots taught apart", () => {
+    const told = withTable(new Map(), mock.landmarks(0.3));
+    expect([told.told, told.landmarks.size]).toEqual([2000, 4]);
+    const moved = [...told.landmarks.values()].filter(({ id }) => id === "learned").map((one) => ({ ...one, at_m: [31.1, 2.5] as [number, number] }));
+    const next = withTable(told.landmarks, { ...mock.landmarks(0.3), revision: 2003, landmarks: moved, removed: ["door", "never-told"] });
+    expect([...next.landmarks.keys()]).toEqual(["corner", "end", "learned"]);
+    expect([next.told, next.landmarks.get("learned")?.at_m]).toEqual([2003, [31.1, 2.5]]);
+    const chosen = update(withModel(), { kind: "select", selection: { kind: "landmark", id: "learned" } });
+    expect(inWords(chosen)?.lines).toContainEqual(["Quality", "4 looks"]);
   });
 
   it("keeps the height with another level, and forgets the rest", () => {

@@ -2,13 +2,13 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use nalgebra::{Matrix2, Matrix3};
+use nalgebra::Matrix2;
 
 use super::contours::Bordering;
 use super::exact::PlanPoint;
 use super::{ObjectId, Opening, Outline, Plan, Sheet};
 use crate::geometry::{Covariance, Point, wrap};
-use crate::landmarks::LandmarkKind;
+use crate::landmarks::{Landmark, LandmarkKind};
 
 /// What counts as a landmark.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,30 +42,26 @@ pub struct LandmarkId {
     pub at: PlanPoint,
 }
 
-/// A landmark of the a-priori model.
+/// A landmark of the a-priori model; its covariance comes from the tolerances of the objects.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Landmark {
+pub struct PlannedLandmark {
     /// Which one.
     pub id: LandmarkId,
-    /// Where it is in the level, metres.
-    pub at: Point,
-    /// Into free space: the bisector of a corner, outward from an end; a doorway's is the normal of its wall, in
-    /// (-pi/2, pi/2], since it is the same from both sides.
-    pub heading: f64,
-    /// Covariance of (x, y, heading), from the tolerances of the objects.
-    pub covariance: Covariance<3>,
+    /// What, where and with which direction: that of a doorway is in (-pi/2, pi/2], since it is the same from both
+    /// sides.
+    pub landmark: Landmark,
     /// The angle of free space at a corner, radians; the width of a doorway or an end, metres (0 for the end of
     /// a sheet).
     pub extent: f64,
 }
 
 /// The landmarks of a plan, in the order of their ids.
-pub fn landmarks(plan: &Plan, config: &LandmarkConfig) -> Vec<Landmark> {
+pub fn landmarks(plan: &Plan, config: &LandmarkConfig) -> Vec<PlannedLandmark> {
     let mut jambs: Vec<PlanPoint> =
         plan.openings.iter().flat_map(|o| &o.sides).flat_map(|s| [s.from, s.to]).collect();
     jambs.sort_unstable();
     let finder = Finder { plan, config, jambs };
-    let mut found: Vec<Landmark> = Vec::new();
+    let mut found: Vec<PlannedLandmark> = Vec::new();
     for Outline { edges } in &plan.outlines {
         let runs = finder.runs(edges, true);
         if runs.len() > 1 {
@@ -144,7 +140,7 @@ impl Finder<'_> {
         self.jambs.binary_search(&at).is_ok()
     }
 
-    fn of_outline(&self, runs: &[Run], found: &mut Vec<Landmark>) {
+    fn of_outline(&self, runs: &[Run], found: &mut Vec<PlannedLandmark>) {
         let count = runs.len();
         for index in 0..count {
             let [before, run, after] =
@@ -155,7 +151,7 @@ impl Finder<'_> {
     }
 
     /// The corner between two runs with free space on their left; on their right, if it is seen from behind.
-    fn corner(&self, first: &Run, second: &Run, from_behind: bool) -> Option<Landmark> {
+    fn corner(&self, first: &Run, second: &Run, from_behind: bool) -> Option<PlannedLandmark> {
         let config = self.config;
         let (u, v) = (first.direction(), second.direction());
         let sine = u.perp(&v);
@@ -189,11 +185,12 @@ impl Finder<'_> {
         // The mean of two directions, whatever they share: no standard deviation is more than the mean of theirs.
         let turns = [(sds[0], first), (sds[1], second)].map(|(sd, run)| turn_sd(sd, run.length()));
         let heading_sd = f64::midpoint(turns[0], turns[1]);
-        Some(self.landmark(kind, owners, first.to, heading, covariance(&place, heading_sd), free))
+        let error = (Covariance::symmetrised(place), heading_sd);
+        Some(self.landmark(kind, owners, first.to, heading, error, free))
     }
 
     /// The end of something too thin for corners: a short run between two long ones that go back alongside each other.
-    fn thin_end(&self, before: &Run, end: &Run, after: &Run) -> Option<Landmark> {
+    fn thin_end(&self, before: &Run, end: &Run, after: &Run) -> Option<PlannedLandmark> {
         let config = self.config;
         let (u, v, w) = (before.direction(), end.direction(), after.direction());
         let square = (1.0 - config.corner_sine_min.powi(2)).sqrt();
@@ -212,19 +209,12 @@ impl Finder<'_> {
         let middle = middle(end.from, end.to);
         // Two faces tell the direction of one wall.
         let length = before.length().min(after.length());
-        let covariance = covariance(&place, turn_sd(sd, length));
+        let error = (Covariance::symmetrised(place), turn_sd(sd, length));
         let heading = outward.y.atan2(outward.x);
-        Some(self.landmark(
-            LandmarkKind::WallEnd,
-            owners,
-            middle,
-            heading,
-            covariance,
-            end.length(),
-        ))
+        Some(self.landmark(LandmarkKind::WallEnd, owners, middle, heading, error, end.length()))
     }
 
-    fn of_sheet(&self, runs: &[Run], ends_free: [bool; 2], found: &mut Vec<Landmark>) {
+    fn of_sheet(&self, runs: &[Run], ends_free: [bool; 2], found: &mut Vec<PlannedLandmark>) {
         for pair in runs.windows(2) {
             found.extend(
                 [false, true]
@@ -246,8 +236,8 @@ impl Finder<'_> {
         for (run, free) in [(back, ends_free[0]), (*last, ends_free[1])] {
             if free && run.length() >= self.config.wall_min && !self.is_jamb(run.to) {
                 let sd = self.plan.owner(run.owners[1]).tolerance;
-                let covariance =
-                    covariance(&Matrix2::from_diagonal_element(sd * sd), turn_sd(sd, run.length()));
+                let place = Covariance::from_variances([sd * sd, sd * sd]);
+                let error = (place, turn_sd(sd, run.length()));
                 let u = run.direction();
                 let owners = [run.owners[1]; 2];
                 let heading = u.y.atan2(u.x);
@@ -256,14 +246,14 @@ impl Finder<'_> {
                     owners,
                     run.to,
                     heading,
-                    covariance,
+                    error,
                     0.0,
                 ));
             }
         }
     }
 
-    fn of_opening(&self, opening: &Opening) -> Option<Landmark> {
+    fn of_opening(&self, opening: &Opening) -> Option<PlannedLandmark> {
         let length = |side: &&super::OpeningSide| side.from.distance(side.to);
         let widest =
             opening.sides.iter().max_by(|a, b| length(a).total_cmp(&length(b)).then(b.cmp(a)))?;
@@ -296,8 +286,14 @@ impl Finder<'_> {
         let place = turned * Matrix2::from_diagonal(&variances.into()) * turned.transpose();
         let id =
             LandmarkId { kind: LandmarkKind::Doorway, objects: sorted([doorway.id, wall.id]), at };
-        let covariance = covariance(&place, turn_sd(wall.tolerance, width));
-        Some(Landmark { id, at: at.metres(), heading, covariance, extent: width })
+        let landmark = Landmark {
+            kind: id.kind,
+            at: at.metres(),
+            direction: heading,
+            covariance: Covariance::symmetrised(place),
+            direction_sd: turn_sd(wall.tolerance, width),
+        };
+        Some(PlannedLandmark { id, landmark, extent: width })
     }
 
     fn landmark(
@@ -305,13 +301,14 @@ impl Finder<'_> {
         kind: LandmarkKind,
         owners: [u32; 2],
         at: PlanPoint,
-        heading: f64,
-        covariance: Covariance<3>,
+        direction: f64,
+        (covariance, direction_sd): (Covariance<2>, f64),
         extent: f64,
-    ) -> Landmark {
+    ) -> PlannedLandmark {
         let objects = sorted(owners.map(|owner| self.plan.owner(owner).id));
         let id = LandmarkId { kind, objects, at };
-        Landmark { id, at: at.metres(), heading, covariance, extent }
+        let landmark = Landmark { kind, at: at.metres(), direction, covariance, direction_sd };
+        PlannedLandmark { id, landmark, extent }
     }
 }
 
@@ -333,11 +330,4 @@ fn middle(a: PlanPoint, b: PlanPoint) -> PlanPoint {
 /// a direction of which nothing is known.
 fn turn_sd(sd: f64, length: f64) -> f64 {
     (std::f64::consts::SQRT_2 * sd / length).min(PI / 3.0_f64.sqrt())
-}
-
-fn covariance(place: &Matrix2<f64>, heading_sd: f64) -> Covariance<3> {
-    let mut all = Matrix3::zeros();
-    all.fixed_view_mut::<2, 2>(0, 0).copy_from(place);
-    all[(2, 2)] = heading_sd * heading_sd;
-    Covariance::symmetrised(all)
 }

@@ -1,12 +1,12 @@
-//! Landmarks of walls: where two walls meet, where one ends, where one has a doorway. Of one look, or of
-//! the map.
+//! Landmarks of faces of walls: where two meet, where one ends, where one has a doorway. Whose faces they are, looks' or
+//! the map's, is said by who makes them.
 
 use nalgebra::Matrix2;
 
 use super::grid::Grid;
 use super::{Landmark, LandmarkKind, ObservedLandmark};
 use crate::geometry::{Covariance, Line, Point, offset_variance, tangent};
-use crate::vector::{EndKind, Facing, ObservedSegment, Segment};
+use crate::vector::{EndKind, Facing, ObservedSegment};
 
 /// When walls make a landmark.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,10 +23,6 @@ pub struct FacesConfig {
     pub doorway_off: (f64, f64),
     /// Share of a doorway that must have been looked through.
     pub seen_through: f64,
-    /// Deviation along the wall of an end of the map, metres.
-    pub end_sd: f64,
-    /// Fewest looks that a wall of the map needs.
-    pub looks_min: u32,
 }
 
 impl FacesConfig {
@@ -38,14 +34,26 @@ impl FacesConfig {
         doorway: (0.65, 1.30),
         doorway_off: (0.15, 0.09),
         seen_through: 0.6,
-        end_sd: 0.05,
-        looks_min: 2,
     };
+}
+
+/// A landmark, and which faces make it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Found {
+    pub(super) landmark: Landmark,
+    /// The angle of free space at a corner, radians; the width of a doorway, metres; 0 for an end.
+    pub(super) extent: f64,
+    /// The walls of the face before and the one after it, free space on the left; the same twice for an end.
+    pub(super) walls: [usize; 2],
+    /// Of an end: whether it is where its face begins.
+    pub(super) is_tail: bool,
 }
 
 /// One side of a wall, with free space on its left.
 #[derive(Debug, Clone)]
-struct Face {
+pub(super) struct Face {
+    /// The number of its wall, by whoever asks.
+    wall: usize,
     /// Unit vector from tail to head.
     direction: Point,
     tail: End,
@@ -65,7 +73,10 @@ struct End {
 }
 
 impl Face {
-    fn new<F: Copy>(
+    /// A face of the wall numbered `wall`, on a line with the covariance of its (rho, alpha); each end with its coordinate
+    /// along the line, its kind and the deviation of that coordinate.
+    pub(super) fn new<F: Copy>(
+        wall: usize,
         line: &Line<F>,
         covariance: Covariance<2>,
         facing: Facing,
@@ -83,7 +94,7 @@ impl Face {
             Facing::Origin => (tangent, low, high),
             Facing::Away => (-tangent, high, low),
         };
-        Self { direction, tail, head, tangent, covariance, open }
+        Self { wall, direction, tail, head, tangent, covariance, open }
     }
 
     fn length(&self) -> f64 {
@@ -117,10 +128,11 @@ pub fn landmarks_of_look(
     segments: &[ObservedSegment],
     config: &FacesConfig,
 ) -> Vec<ObservedLandmark> {
-    let faces = segments.iter().map(|segment| {
+    let faces = segments.iter().enumerate().map(|(wall, segment)| {
         let end = |i: usize, along: f64| (along, segment.ends[i].kind, segment.ends[i].sd);
         let open = segment.seen_through.iter().map(|gap| (gap.from_m(), gap.to_m()));
         Face::new(
+            wall,
             &segment.line.line,
             segment.line.covariance,
             segment.facing,
@@ -128,40 +140,18 @@ pub fn landmarks_of_look(
             open.collect(),
         )
     });
-    landmarks(faces.collect(), config)
+    landmarks(faces.collect(), config).into_iter().map(|found| found.landmark).collect()
 }
 
-/// The landmarks of a map's walls, in the level frame.
-pub fn landmarks_of_map<'a>(
-    segments: impl IntoIterator<Item = &'a Segment>,
-    config: &FacesConfig,
-) -> Vec<Landmark> {
-    let mut faces = Vec::new();
-    for segment in segments.into_iter().filter(|s| s.looks >= config.looks_min) {
-        // Between solid parts of one wall beams went through; beyond them nobody knows.
-        let gaps = segment.solid.windows(2);
-        let open: Vec<(f64, f64)> =
-            gaps.map(|parts| (parts[0].span.to_m(), parts[1].span.from_m())).collect();
-        for part in &segment.solid {
-            let ends = [
-                (part.span.from_m(), part.ends[0], config.end_sd),
-                (part.span.to_m(), part.ends[1], config.end_sd),
-            ];
-            let covariance = segment.independent + segment.dependent;
-            faces.push(Face::new(&segment.line, covariance, segment.facing, ends, open.clone()));
-        }
-    }
-    landmarks(faces, config)
-}
-
-fn landmarks(mut faces: Vec<Face>, config: &FacesConfig) -> Vec<Landmark> {
+/// The landmarks that faces make: corners, closest first, then doorways and ends, face by face.
+pub(super) fn landmarks(mut faces: Vec<Face>, config: &FacesConfig) -> Vec<Found> {
     faces.retain(|face| face.length() >= config.length_min);
     let tails: Vec<Point> = faces.iter().map(|face| face.tail.at).collect();
     let by_tail = Grid::new(&tails, 1.0);
     let mut found = Vec::new();
     let (mut heads_met, mut tails_met) = (vec![false; faces.len()], vec![false; faces.len()]);
     // Corners: of each head the closest tail that meets it, closest pairs first.
-    let mut meetings: Vec<(f64, usize, usize, Landmark)> = Vec::new();
+    let mut meetings: Vec<(f64, usize, usize, Found)> = Vec::new();
     for (a, first) in faces.iter().enumerate() {
         for b in by_tail.near(&first.head.at, 4.0 * config.reach) {
             let b = b as usize;
@@ -184,17 +174,17 @@ fn landmarks(mut faces: Vec<Face>, config: &FacesConfig) -> Vec<Landmark> {
         let doorway = near.filter(|b| *b as usize != a);
         found.extend(doorway.filter_map(|b| self::doorway(first, &faces[b as usize], config)));
         if first.head.kind == EndKind::Jump && !heads_met[a] {
-            found.push(wall_end(first, &first.head, first.direction));
+            found.push(wall_end(first, false));
         }
         if first.tail.kind == EndKind::Jump && !tails_met[a] {
-            found.push(wall_end(first, &first.tail, -first.direction));
+            found.push(wall_end(first, true));
         }
     }
     found
 }
 
 /// Where the head of one face meets the tail of another, if it does, and how far their ends are off.
-fn corner(a: &Face, b: &Face, config: &FacesConfig) -> Option<(f64, Landmark)> {
+fn corner(a: &Face, b: &Face, config: &FacesConfig) -> Option<(f64, Found)> {
     let (n, m) = (a.normal(), b.normal());
     let sine = a.direction.perp(&b.direction);
     if sine.abs() < config.sine_min {
@@ -220,11 +210,14 @@ fn corner(a: &Face, b: &Face, config: &FacesConfig) -> Option<(f64, Landmark)> {
         covariance: offsets.transformed(&inverse),
         direction_sd: 0.5 * (a.direction_variance() + b.direction_variance()).sqrt(),
     };
-    Some((off(&a.head) + off(&b.tail), landmark))
+    // Free space is on the left: a turn to the left narrows it.
+    let extent = std::f64::consts::PI - sine.atan2(a.direction.dot(&b.direction));
+    let found = Found { landmark, extent, walls: [a.wall, b.wall], is_tail: false };
+    Some((off(&a.head) + off(&b.tail), found))
 }
 
 /// The doorway between the head of one face and the tail of the next on one line.
-fn doorway(a: &Face, b: &Face, config: &FacesConfig) -> Option<Landmark> {
+fn doorway(a: &Face, b: &Face, config: &FacesConfig) -> Option<Found> {
     let gap = b.tail.at - a.head.at;
     let width = gap.dot(&a.direction);
     let fits = width >= config.doorway.0
@@ -240,18 +233,21 @@ fn doorway(a: &Face, b: &Face, config: &FacesConfig) -> Option<Landmark> {
     let along = 0.25 * (a.head.along_sd.powi(2) + b.tail.along_sd.powi(2));
     let across = 0.5 * (a.offset_variance(&at) + b.offset_variance(&at));
     let direction = a.normal();
-    Some(Landmark {
+    let landmark = Landmark {
         kind: LandmarkKind::Doorway,
         at,
         direction: direction.y.atan2(direction.x),
         covariance: along_and_across(&a.direction, along, across),
         direction_sd: (0.5 * (a.direction_variance() + b.direction_variance())).sqrt(),
-    })
+    };
+    Some(Found { landmark, extent: width, walls: [a.wall, b.wall], is_tail: false })
 }
 
 /// A free end, which opens along its wall outwards.
-fn wall_end(face: &Face, end: &End, outwards: Point) -> Landmark {
-    Landmark {
+fn wall_end(face: &Face, is_tail: bool) -> Found {
+    let (end, outwards) =
+        if is_tail { (&face.tail, -face.direction) } else { (&face.head, face.direction) };
+    let landmark = Landmark {
         kind: LandmarkKind::WallEnd,
         at: end.at,
         direction: outwards.y.atan2(outwards.x),
@@ -261,7 +257,8 @@ fn wall_end(face: &Face, end: &End, outwards: Point) -> Landmark {
             face.offset_variance(&end.at),
         ),
         direction_sd: face.direction_variance().sqrt(),
-    }
+    };
+    Found { landmark, extent: 0.0, walls: [face.wall; 2], is_tail }
 }
 
 /// A covariance from its variances along a unit vector and across it.

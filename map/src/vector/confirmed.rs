@@ -8,7 +8,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::Segment;
+use super::{Segment, SolidInterval};
 use crate::raster::{EvidenceRun, LogOdds, TileIndex, TilePatch, crossed};
 
 /// When a wall is confirmed, and what it then says.
@@ -26,6 +26,12 @@ impl ConfirmedConfig {
     /// Three looks, and as sure as reading gets (5 nat: two looks more than went through it). It then says 2 nat
     /// (0.88): occupied for all readers, and no more than the last slices of evidence count for against a new one.
     pub const STANDARD: Self = Self { looks_min: 3, existence_min: LogOdds(500), says: 200 };
+
+    /// The parts of a segment that are confirmed.
+    pub fn parts<'a>(&self, segment: &'a Segment) -> impl Iterator<Item = &'a SolidInterval> {
+        let (enough, least) = (segment.looks >= self.looks_min, self.existence_min);
+        segment.solid.iter().filter(move |part| enough && part.existence >= least)
+    }
 }
 
 /// What the confirmed parts of a wall say, tile by tile, on a grid of `resolution` metres a cell.
@@ -36,9 +42,7 @@ pub fn confirmed(
     config: &ConfirmedConfig,
 ) -> BTreeMap<TileIndex, TilePatch> {
     let mut tiles: BTreeMap<TileIndex, BTreeSet<usize>> = BTreeMap::new();
-    let enough = segment.looks >= config.looks_min;
-    let parts = segment.solid.iter().filter(|part| part.existence >= config.existence_min);
-    for part in parts.filter(|_| enough) {
+    for part in config.parts(segment) {
         let [a, b] = [part.span.from_m(), part.span.to_m()].map(|along| segment.line.at(along));
         for cell in crossed(&a, &b, resolution) {
             let (tile, offset) = cell.tile();

@@ -85,8 +85,8 @@ proptest! {
         }
         let plan = structure.plan(height);
         for landmark in landmarks(&plan, &LandmarkConfig::STANDARD) {
-            prop_assert!(landmark.at.iter().all(|v| v.is_finite()) && landmark.heading.is_finite());
-            prop_assert!(landmark.covariance.matrix().iter().all(|v| v.is_finite()));
+            prop_assert!(landmark.landmark.at.iter().all(|v| v.is_finite()) && landmark.landmark.direction.is_finite());
+            prop_assert!(landmark.landmark.covariance.matrix().iter().all(|v| v.is_finite()));
             prop_assert!(landmark.extent.is_finite());
         }
         // Coarse and bounded: some of these stand 10 km away.

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use mapfold_map::gdb::{
-    Kind, Landmark, LandmarkConfig, Object, Placement, Plan, Point3, Shape, Solid, landmarks,
+    Kind, LandmarkConfig, Object, Placement, Plan, PlannedLandmark, Point3, Shape, Solid, landmarks,
 };
 use mapfold_map::geometry::wrap;
 
@@ -11,7 +11,7 @@ use super::world::{block, doorway, id, metres, plan, wall};
 use LandmarkKind::{ConcaveCorner, ConvexCorner, Doorway, WallEnd};
 use mapfold_map::landmarks::LandmarkKind;
 
-fn of(plan: &Plan) -> Vec<Landmark> {
+fn of(plan: &Plan) -> Vec<PlannedLandmark> {
     landmarks(plan, &LandmarkConfig::STANDARD)
 }
 
@@ -19,7 +19,7 @@ fn of(plan: &Plan) -> Vec<Landmark> {
 fn seen(plan: &Plan) -> Vec<(LandmarkKind, [f64; 2], i32)> {
     let mut seen: Vec<_> = of(plan)
         .iter()
-        .map(|l| (l.id.kind, metres(l.id.at), l.heading.to_degrees().round() as i32))
+        .map(|l| (l.id.kind, metres(l.id.at), l.landmark.direction.to_degrees().round() as i32))
         .collect();
     seen.sort_by(|a, b| a.partial_cmp(b).unwrap());
     seen
@@ -123,19 +123,21 @@ fn landmarks_turn_with_the_building() {
     let slanting = of(&plan(turned(yaw), 0.5));
     assert_eq!(straight.len(), slanting.len());
     for landmark in straight {
-        let d = landmark.at - mapfold_map::geometry::Point::new(3.0, -2.0);
+        let d = landmark.landmark.at - mapfold_map::geometry::Point::new(3.0, -2.0);
         let at =
             mapfold_map::geometry::Point::new(3.0 + c * d.x - s * d.y, -2.0 + s * d.x + c * d.y);
-        let twin = slanting.iter().find(|l| (l.at - at).norm() < 5e-6).unwrap();
+        let twin = slanting.iter().find(|l| (l.landmark.at - at).norm() < 5e-6).unwrap();
         assert_eq!(twin.id.kind, landmark.id.kind);
         assert_eq!(twin.id.objects, landmark.id.objects);
-        let turn = wrap(twin.heading - landmark.heading - yaw).abs();
+        let turn = wrap(twin.landmark.direction - landmark.landmark.direction - yaw).abs();
         let turn = if landmark.id.kind == Doorway { turn.min(PI - turn) } else { turn };
         assert!(turn < 1e-4, "{landmark:?} {twin:?}");
-        let rotation = nalgebra::Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0);
-        let difference =
-            landmark.covariance.transformed(&rotation).matrix() - twin.covariance.matrix();
+        let rotation = nalgebra::Matrix2::new(c, -s, s, c);
+        let difference = landmark.landmark.covariance.transformed(&rotation).matrix()
+            - twin.landmark.covariance.matrix();
         assert!(difference.amax() < 1e-7, "{difference}");
+        let sds = [&landmark, twin].map(|l| l.landmark.direction_sd);
+        assert!((sds[0] - sds[1]).abs() < 1e-6, "{sds:?}");
     }
 }
 
@@ -146,7 +148,7 @@ fn a_corner_is_as_uncertain_as_what_makes_it() {
     let exact = |object: Object, sd: f64| Object { tolerance: sd, ..object };
     let cupboard = [exact(block(Kind::Furniture, [0.0, 0.0], [1.0, 0.5], [0.0, 1.0]), 0.05)];
     for landmark in of(&plan(cupboard, 0.5)) {
-        let m = *landmark.covariance.matrix();
+        let m = *landmark.landmark.covariance.matrix();
         assert!((m[(0, 0)] - 0.0025).abs() < 1e-12 && (m[(1, 1)] - 0.0025).abs() < 1e-12);
         assert!(m[(0, 1)].abs() < 1e-12);
     }
@@ -162,14 +164,15 @@ fn a_corner_is_as_uncertain_as_what_makes_it() {
         ),
     ];
     let found = of(&plan(walls, 0.5));
-    let corner = found.iter().find(|l| l.id.kind == ConcaveCorner && l.at.norm() < 1e-5).unwrap();
-    let m = *corner.covariance.matrix();
+    let corner =
+        found.iter().find(|l| l.id.kind == ConcaveCorner && l.landmark.at.norm() < 1e-5).unwrap();
+    let m = *corner.landmark.covariance.matrix();
     // y from the first wall, and x = y - sqrt(2) d of the second.
     assert!((m[(1, 1)] - 4e-4).abs() < 1e-8);
     assert!((m[(0, 1)] - 4e-4).abs() < 1e-8);
     assert!((m[(0, 0)] - (4e-4 + 2.0 * 16e-4)).abs() < 1e-8);
     assert!((corner.extent - 3.0 * FRAC_PI_4).abs() < 1e-5);
-    assert!((wrap(corner.heading) - (PI - 3.0 * FRAC_PI_4 / 2.0)).abs() < 1e-4);
+    assert!((wrap(corner.landmark.direction) - (PI - 3.0 * FRAC_PI_4 / 2.0)).abs() < 1e-4);
 }
 
 #[test]

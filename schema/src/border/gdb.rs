@@ -16,7 +16,7 @@ use uuid::Uuid;
 
 pub use document::{CheckedDocument, check_document};
 pub use findings::{finding_code, wire_finding};
-pub use plan::{landmark_id, wire_gdb_landmark, wire_plan};
+pub use plan::{landmark_id, learned_id, wire_gdb_landmark, wire_learned_landmark, wire_plan};
 pub use solids::vertex_count;
 
 use super::number::finite;

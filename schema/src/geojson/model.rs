@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::io::{self, Write};
 
-use mapfold_map::gdb::{Edge, Landmark, Plan};
+use mapfold_map::gdb::{Edge, Plan, PlannedLandmark};
 use uuid::Uuid;
 
 use super::{Features, Geometry, Properties, coordinates, ring};
@@ -25,7 +25,7 @@ pub(super) enum PlanShape {
 
 impl<W: Write> Features<'_, W> {
     /// What a sensor at one height would see, and the landmarks there.
-    pub(super) fn model(&mut self, plan: &Plan, landmarks: &[Landmark]) -> io::Result<()> {
+    pub(super) fn model(&mut self, plan: &Plan, landmarks: &[PlannedLandmark]) -> io::Result<()> {
         for (index, outline) in plan.outlines().iter().enumerate() {
             let edges: Vec<Edge<'_>> = plan.edges_of(outline).collect();
             let mut vertices: Vec<[f64; 2]> = edges.iter().map(start).collect();

@@ -104,6 +104,18 @@ pub struct Landmark {
     pub extent: f64,
     /// The objects that make it, or the segments' ids.
     pub objects: Vec<String>,
+    /// Of what robots saw: who bears it out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub support: Option<LandmarkSupport>,
+}
+
+/// Who bears out a landmark that robots saw.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct LandmarkSupport {
+    /// Quality: distinct looks at the least seen of its walls.
+    pub looks: u32,
+    /// Who saw any of its walls, ascending.
+    pub robots: Vec<String>,
 }
 
 /// Where a landmark is known from.
@@ -112,7 +124,7 @@ pub struct Landmark {
 pub enum LandmarkSource {
     /// The published GDB.
     Gdb,
-    /// What robots saw.
+    /// What robots saw, and what the published GDB does not know.
     Learned,
 }
 

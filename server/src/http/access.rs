@@ -21,7 +21,7 @@ use crate::level::{LevelHandle, SinceError, Snapshot};
 /// Name of the cookie that bears a session's token.
 pub(super) const SESSION_COOKIE: &str = "mapfold_session";
 /// How long a read waits for a revision that another replica has shown already.
-const REPLICA_PATIENCE: Duration = Duration::from_secs(2);
+pub(super) const REPLICA_PATIENCE: Duration = Duration::from_secs(2);
 
 /// A scope that a handler needs, as a type.
 pub(super) trait Needs: Send + 'static {

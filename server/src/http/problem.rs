@@ -16,6 +16,7 @@ use crate::exchange::building::BuildingError;
 use crate::exchange::incoming::FileFault;
 use crate::exchange::nav2::{ImportError, Nav2Error};
 use crate::level::changes::NotAcceptable;
+use crate::level::learned::LearnedError;
 use crate::level::{LevelError, RevertError, SinceError, SubmitError};
 use crate::store::StoreError;
 use crate::store::acts::RevertRefusal;
@@ -77,6 +78,8 @@ pub(super) enum ApiError {
     Revert(RevertError),
     /// A revision that the map has not reached.
     Since(SinceError),
+    /// Nobody knows any more what landmarks a reader was told.
+    Forgotten { since: i64 },
     /// A level cannot be opened.
     Level(LevelError),
     /// The store failed.
@@ -100,6 +103,15 @@ impl From<StoreError> for ApiError {
 impl From<LevelError> for ApiError {
     fn from(error: LevelError) -> Self {
         Self::Level(error)
+    }
+}
+
+impl From<LearnedError> for ApiError {
+    fn from(error: LearnedError) -> Self {
+        match error {
+            LearnedError::Store(error) => Self::Store(error),
+            LearnedError::Forgotten { since } => Self::Forgotten { since },
+        }
     }
 }
 
@@ -197,6 +209,13 @@ impl ApiError {
             Self::Submit(error) => unacknowledged(error),
             Self::Revert(error) => unreverted(error),
             Self::Since(error) => ahead(error),
+            Self::Forgotten { since } => {
+                let detail = format!(
+                    "What you were told at revision {since} is not known here any more: forget it and read again from \
+                    revision 0."
+                );
+                of(410, "cursor_expired", detail)
+            }
             Self::Level(LevelError::Closing) => Self::Closing.problem(),
             Self::Level(LevelError::Store(error)) | Self::Store(error) => of_store(error),
             Self::NotZip => {

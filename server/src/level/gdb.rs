@@ -8,8 +8,8 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use mapfold_map::changes::TooMuchSurface;
 use mapfold_map::gdb::{
-    Finding, Landmark, LandmarkConfig, Model, Plan, PriorError, PrototypeName, Shape, Structure,
-    TooCrowded, findings, landmarks,
+    Finding, LandmarkConfig, Model, Plan, PlannedLandmark, PriorError, PrototypeName, Shape,
+    Structure, TooCrowded, findings, landmarks,
 };
 use mapfold_schema::border::Violation;
 use mapfold_schema::border::gdb::{
@@ -69,7 +69,7 @@ pub type WireLibrary = BTreeMap<String, v1::GdbPrototype>;
 #[derive(Debug)]
 struct Cut {
     plan: Plan,
-    landmarks: OnceLock<Arc<Vec<Landmark>>>,
+    landmarks: OnceLock<Arc<Vec<PlannedLandmark>>>,
 }
 
 /// A model at one version.
@@ -201,7 +201,7 @@ impl GdbModel {
     ///
     /// # Errors
     /// [`GdbError::TooCrowded`].
-    pub fn landmarks(&self, height_m: f64) -> Result<Arc<Vec<Landmark>>, GdbError> {
+    pub fn landmarks(&self, height_m: f64) -> Result<Arc<Vec<PlannedLandmark>>, GdbError> {
         let cut = self.cut(height_m)?;
         let made = || Arc::new(landmarks(&cut.plan, &LandmarkConfig::STANDARD));
         Ok(Arc::clone(cut.landmarks.get_or_init(made)))

@@ -95,6 +95,11 @@ impl<K: Least, V: PartialEq> History<K, V> {
         self.things.insert_mut(key, Dated { revision, value });
     }
 
+    /// The revision of the last change of all; 0 before the first.
+    pub(super) fn changed_at(&self) -> i64 {
+        self.by_revision.last().map_or(0, |(revision, _)| *revision)
+    }
+
     /// Number of things that are.
     pub(super) fn live_count(&self) -> usize {
         self.live

@@ -12,6 +12,7 @@ use super::append::Appender;
 use super::changes::ChangeCache;
 use super::fold::Folder;
 use super::gdb::ModelCache;
+use super::learned::LearnedCache;
 use super::open::{self, Opened};
 use super::snapshot::Snapshot;
 use super::write_behind::Writer;
@@ -307,6 +308,7 @@ impl Inner {
             trials,
             models: ModelCache::default(),
             changes: ChangeCache::default(),
+            learned: LearnedCache::default(),
             store: self.store.clone(),
             alarm: self.alarm.clone(),
         });

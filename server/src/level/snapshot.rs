@@ -109,6 +109,11 @@ impl Snapshot {
         self.history.segments.live()
     }
 
+    /// The revision at which a segment changed last; 0 if none ever was.
+    pub(super) fn segments_changed_at(&self) -> i64 {
+        self.history.segments.changed_at()
+    }
+
     /// The clusters, by identity.
     pub fn clusters(&self) -> impl Iterator<Item = (&FeatureId, &Arc<Cluster>)> {
         self.history.clusters.live()

@@ -23,6 +23,7 @@ mod events;
 mod exports;
 mod gdb;
 mod imports;
+mod landmarks;
 mod layers;
 mod life;
 mod models;

@@ -49,9 +49,12 @@ const MODULES: &[(&str, &[ModuleRule])] = &[
             // For unit tests only.
             ("chance", &[]),
             ("geometry", &[]),
-            ("landmarks", &["chance", "geometry", "vector"]),
+            (
+                "landmarks",
+                &["chance", "geometry", "vector", "level::FeatureId", "level::RobotName"],
+            ),
             ("raster", &["chance", "geometry"]),
-            ("gdb", &["geometry", "landmarks::LandmarkKind", "raster"]),
+            ("gdb", &["geometry", "landmarks::Landmark", "landmarks::LandmarkKind", "raster"]),
             // Features bear the identities that contributions give them; of the fold they know nothing.
             (
                 "vector",

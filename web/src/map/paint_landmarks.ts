@@ -1,5 +1,5 @@
 // Paints landmarks: a disc where each is, a ray to where it opens. Corners that jut out are filled, those of
-// rooms hollow, ends of walls small, doorways have a ray to both sides.
+// rooms hollow, ends of walls small, doorways have a ray to both sides. What only robots know has a dashed ring around it.
 
 import type { Theme } from "../palette";
 import type { Landmark, LandmarkKind } from "../wire";
@@ -7,6 +7,8 @@ import { boxShown, xScreenFromLevel, yScreenFromLevel, type Frame } from "./fram
 
 const RADIUS_PX: Readonly<Record<LandmarkKind, number>> = { convex_corner: 4, concave_corner: 4, wall_end: 2.5, doorway: 3 };
 const RAY_PX = 10;
+/** Of the ring around a landmark that robots taught. */
+const RING_PX = 7;
 /** Metres per pixel from which on rays would only blur. */
 const RAYS_UP_TO = 0.12;
 
@@ -18,7 +20,7 @@ export function paintLandmarks(frame: Frame, landmarks: Iterable<Landmark>, them
   pen.strokeStyle = theme.landmark;
   pen.lineWidth = 1.5;
   pen.lineCap = "round";
-  for (const { at_m: at, heading_rad: headingRad, kind } of landmarks) {
+  for (const { at_m: at, heading_rad: headingRad, kind, source } of landmarks) {
     const [x, y] = at;
     if (x < left || x > right || y < bottom || y > top) continue;
     painted++;
@@ -36,6 +38,13 @@ export function paintLandmarks(frame: Frame, landmarks: Iterable<Landmark>, them
     pen.arc(xPx, yPx, RADIUS_PX[kind], 0, 2 * Math.PI);
     pen.fill();
     pen.stroke();
+    if (source === "learned") {
+      pen.setLineDash([2, 2]);
+      pen.beginPath();
+      pen.arc(xPx, yPx, RING_PX, 0, 2 * Math.PI);
+      pen.stroke();
+      pen.setLineDash([]);
+    }
   }
   return painted;
 }

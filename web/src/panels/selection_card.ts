@@ -40,7 +40,7 @@ export function describe(state: State): Description | null {
     }
     case "landmark": {
       const landmark = state.model.landmarks.get(selection.id);
-      return landmark === undefined ? null : describeLandmark(landmark);
+      return landmark === undefined ? null : describeLandmark(landmark, state);
     }
     case "robot": {
       const robot = state.robots.find((one) => one.robot === selection.id);
@@ -115,15 +115,17 @@ const AREA_WORDS: Readonly<Record<Chain["kind"], string>> = {
   room: "free inside",
 };
 
-function describeLandmark(landmark: Landmark): Description {
+function describeLandmark(landmark: Landmark, state: State): Description {
   const [x, y] = landmark.at_m;
   const [[xx, xy], [, yy], [, , hh]] = landmark.covariance;
+  const { support } = landmark;
   const isCorner = landmark.kind === "convex_corner" || landmark.kind === "concave_corner";
   return {
     title: "Landmark",
     lines: [
       ["What", LANDMARK_WORDS[landmark.kind]],
       ["Known from", landmark.source === "gdb" ? "the published model" : "what robots saw"],
+      ...(support == null ? [] : [["Quality", counted(support.looks, "look")] as const, ["Seen by", names(support.robots, state)] as const]),
       ["Position", `x ${coordinate(x)}, y ${coordinate(y)}`],
       ["Position", `95 % within ${lengthInWords(ellipse95(xx, xy, yy).majorM)}`],
       ["Opens to", `${degrees(landmark.heading_rad)}, sd ${degrees(Math.sqrt(hh), 2)}`],

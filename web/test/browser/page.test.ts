@@ -283,7 +283,8 @@ describe("the operator", () => {
     await until("model", "0.75 14");
 
     await page.check("#layer-landmarks");
-    await until("landmarks", 3);
+    await until("landmarks", 4);
+    await until("learned", 1);
     await page.mouse.click(...(await at(29.45, 0)));
     await page.waitForFunction(() => document.querySelector(".selection")?.textContent.includes("doorway"));
   });

@@ -88,7 +88,11 @@ export function createMockModel({ nowMs }) {
         { id: "end", kind: "wall_end", source: "gdb", at_m: [28, 1.5], heading_rad: Math.PI / 2, covariance: [[4e-4, 0, 0], [0, 4e-4, 0], [0, 0, 1e-4]], extent: 0.1, objects: [WALL] },
         { id: "door", kind: "doorway", source: "gdb", at_m: [29.45, 0], heading_rad: Math.PI / 2, covariance: [[4e-4, 0, 0], [0, 4e-4, 0], [0, 0, 1e-4]], extent: 0.9, objects: [DOOR] },
       ];
-      return { revision: 2000, publication: isThere ? 2001 : 0, height_m: heightM, landmarks: isThere ? landmarks : [], removed: [] };
+      /** @type {LandmarkTable["landmarks"]} */
+      const learned = [
+        { id: "learned", kind: "wall_end", source: "learned", at_m: [31, 2.5], heading_rad: 0, covariance: [[4e-4, 0, 0], [0, 4e-4, 0], [0, 0, 1e-4]], extent: 0, objects: ["a-0"], support: { looks: 4, robots: ["anna"] } },
+      ];
+      return { revision: 2000, publication: isThere ? 2001 : 0, height_m: heightM, landmarks: isThere ? [...landmarks, ...learned] : learned, removed: [] };
     },
   };
 }

@@ -1,10 +1,12 @@
-//! Plans and landmarks of the GDB, as they travel.
+//! Plans of the GDB, and landmarks of it and of the map, as they travel.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use mapfold_map::gdb::{Edge, Landmark, LandmarkId, Plan, PlanPoint};
+use mapfold_map::gdb::{Edge, LandmarkId, Plan, PlanPoint, PlannedLandmark};
+use mapfold_map::landmarks::{Landmark, LandmarkKind, LearnedId, LearnedLandmark};
 
+use super::super::features::feature_id;
 use super::object_uuid;
 use crate::v1;
 
@@ -64,14 +66,8 @@ fn metres(at: PlanPoint) -> [f64; 2] {
 
 /// The identity of a landmark of the GDB: kind, objects, and place in micrometres.
 pub fn landmark_id(id: &LandmarkId) -> String {
-    let kind = match v1::LandmarkKind::from(id.kind) {
-        v1::LandmarkKind::ConvexCorner => "convex",
-        v1::LandmarkKind::ConcaveCorner => "concave",
-        v1::LandmarkKind::WallEnd => "end",
-        v1::LandmarkKind::Doorway => "doorway",
-    };
     let [first, second] = id.objects.map(object_uuid);
-    let mut text = format!("{kind}:{first}");
+    let mut text = format!("{}:{first}", kind(id.kind));
     if second != first {
         let _ = write!(text, ":{second}"); // writing to a String cannot fail
     }
@@ -79,19 +75,59 @@ pub fn landmark_id(id: &LandmarkId) -> String {
     text
 }
 
+/// The identity of a landmark of the map: that it is learned, kind, segments, and which one of them.
+pub fn learned_id(id: &LearnedId) -> String {
+    let [first, second] = id.walls.map(|wall| feature_id(&wall));
+    let mut text = format!("learned:{}:{first}", kind(id.kind));
+    if id.walls[0] != id.walls[1] {
+        let _ = write!(text, ":{second}"); // writing to a String cannot fail
+    }
+    let _ = write!(text, ":{}", id.place);
+    text
+}
+
+fn kind(kind: LandmarkKind) -> &'static str {
+    match kind {
+        LandmarkKind::ConvexCorner => "convex",
+        LandmarkKind::ConcaveCorner => "concave",
+        LandmarkKind::WallEnd => "end",
+        LandmarkKind::Doorway => "doorway",
+    }
+}
+
 /// A landmark of the GDB.
-pub fn wire_gdb_landmark(landmark: &Landmark) -> v1::Landmark {
-    let [first, second] = landmark.id.objects.map(object_uuid);
+pub fn wire_gdb_landmark(planned: &PlannedLandmark) -> v1::Landmark {
+    let [first, second] = planned.id.objects.map(object_uuid);
     let mut objects = vec![first.to_string()];
     objects.extend((second != first).then(|| second.to_string()));
+    wire(landmark_id(&planned.id), &planned.landmark, planned.extent, objects)
+}
+
+/// A landmark of the map.
+pub fn wire_learned_landmark(learned: &LearnedLandmark) -> v1::Landmark {
+    let [first, second] = learned.id.walls.map(|wall| feature_id(&wall));
+    let mut objects = vec![first];
+    objects.extend((learned.id.walls[0] != learned.id.walls[1]).then_some(second));
+    let robots = learned.robots.iter().map(ToString::to_string).collect();
     v1::Landmark {
-        id: landmark_id(&landmark.id),
-        kind: landmark.id.kind.into(),
+        source: v1::LandmarkSource::Learned,
+        support: Some(v1::LandmarkSupport { looks: learned.looks, robots }),
+        ..wire(learned_id(&learned.id), &learned.landmark, learned.extent, objects)
+    }
+}
+
+fn wire(id: String, landmark: &Landmark, extent: f64, objects: Vec<String>) -> v1::Landmark {
+    let [[xx, xy], [yx, yy]] = landmark.covariance.rows();
+    let turn = landmark.direction_sd * landmark.direction_sd;
+    v1::Landmark {
+        id,
+        kind: landmark.kind.into(),
         source: v1::LandmarkSource::Gdb,
         at_m: [landmark.at.x, landmark.at.y],
-        heading_rad: landmark.heading,
-        covariance: landmark.covariance.rows(),
-        extent: landmark.extent,
+        heading_rad: landmark.direction,
+        covariance: [[xx, xy, 0.0], [yx, yy, 0.0], [0.0, 0.0, turn]],
+        extent,
         objects,
+        support: None,
     }
 }
