@@ -57,6 +57,18 @@ impl Server {
         ADMIN_TOKEN
     }
 
+    /// A figure of its memory in kilobytes, as the kernel names it: `VmRSS`, or `VmHWM` for the most that it ever was.
+    ///
+    /// # Errors
+    /// It has ended, or the kernel does not say.
+    pub fn memory_kb(&self, name: &str) -> Result<u64, Error> {
+        let path = PathBuf::from(format!("/proc/{}/status", self.child.id().unwrap_or_default()));
+        let status = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, e))?;
+        let line = status.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(':'));
+        let figure = line.and_then(|line| line.trim().trim_end_matches(" kB").parse().ok());
+        figure.ok_or_else(|| self.fault(&format!("has no {name}")))
+    }
+
     /// What it keeps its levels in.
     pub fn database(&self) -> &Database {
         &self.database

@@ -58,6 +58,8 @@ pub enum FindingKind {
     NoArea,
     /// A ring that meets itself or another one of its face.
     MeetsItself,
+    /// A ring whose edges run beside each other too often to be looked through.
+    TooIntricate,
     /// A hole that is not within the outer ring, or within another hole.
     HoleOutside,
     /// A face whose vertices do not lie in one plane.
@@ -125,6 +127,9 @@ impl fmt::Display for FindingKind {
             Self::RepeatedVertex => f.write_str("two corners in a row are the same: delete one"),
             Self::NoArea => f.write_str("the polygon encloses nothing: pull its corners apart, or delete it"),
             Self::MeetsItself => f.write_str("the outline meets itself here: move a corner so that it does not"),
+            Self::TooIntricate => f.write_str(
+                "the edges run beside each other too often to be looked through: draw it with fewer corners, or in parts",
+            ),
             Self::HoleOutside => f.write_str("the hole does not lie in its polygon: move it inside, or delete it"),
             Self::NotPlane { off } => write!(
                 f,

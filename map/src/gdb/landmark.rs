@@ -21,12 +21,19 @@ pub struct LandmarkConfig {
     pub straight_sine_max: f64,
     /// Corners nearer to each other than this are one, metres: what snapping and drawing leave.
     pub detail_min: f64,
+    /// Whatever two walls leave within this of where their lines meet is a detail of their corner, metres.
+    pub bevel_max: f64,
 }
 
 impl LandmarkConfig {
     /// The defaults.
-    pub const STANDARD: Self =
-        Self { wall_min: 0.25, corner_sine_min: 0.35, straight_sine_max: 0.02, detail_min: 0.001 };
+    pub const STANDARD: Self = Self {
+        wall_min: 0.25,
+        corner_sine_min: 0.35,
+        straight_sine_max: 0.02,
+        detail_min: 0.001,
+        bevel_max: 0.05,
+    };
 }
 
 /// Identity of a landmark: what it is, whose, and where. Nothing else in the model can rename it, and plans of
@@ -140,18 +147,60 @@ impl Finder<'_> {
         self.jambs.binary_search(&at).is_ok()
     }
 
+    /// Corners and ends of an outline: of each two walls that follow each other, with nothing or with details between them.
     fn of_outline(&self, runs: &[Run], found: &mut Vec<PlannedLandmark>) {
-        let count = runs.len();
-        for index in 0..count {
-            let [before, run, after] =
-                [index + count - 1, index, index + 1].map(|k| runs[k % count]);
-            found.extend(self.corner(&before, &run, false));
-            found.extend(self.thin_end(&before, &run, &after));
+        let long = |run: &Run| run.length() >= self.config.wall_min;
+        let walls: Vec<usize> = (0..runs.len()).filter(|k| long(&runs[*k])).collect();
+        if walls.len() < 2 {
+            return;
         }
+        for (number, from) in walls.iter().enumerate() {
+            let to = walls[(number + 1) % walls.len()];
+            let (first, second) = (&runs[*from], &runs[to]);
+            let between: Vec<Run> = (from + 1..from + runs.len())
+                .map(|k| k % runs.len())
+                .take_while(|k| *k != to)
+                .map(|k| runs[k])
+                .collect();
+            found.extend(if between.is_empty() {
+                self.corner(first, second, false)
+            } else {
+                let rounded = self.cut_corner(first, &between, second);
+                rounded.or_else(|| self.thin_end(first, &between, second))
+            });
+        }
+    }
+
+    /// The corner of two walls that lack a little of it: where their lines meet, if all of the way from the one to the
+    /// other is near there. So a bevel is none, nor are the steps that doubly drawn or sharply turning walls leave.
+    fn cut_corner(&self, first: &Run, between: &[Run], second: &Run) -> Option<PlannedLandmark> {
+        let (u, v) = (first.direction(), second.direction());
+        let gap = second.from.metres() - first.to.metres();
+        // From the end of the first wall: u s = gap + v t.
+        let at = first.to.metres() + u * (gap.perp(&v) / u.perp(&v));
+        let near = |p: PlanPoint| (p.metres() - at).norm() <= self.config.bevel_max;
+        if !near(first.to) || !between.iter().all(|run| near(run.to)) {
+            return None;
+        }
+        if between.iter().any(|run| self.is_jamb(run.to)) {
+            return None;
+        }
+        let at = PlanPoint::nearest(&at)?;
+        self.corner_at(at, first, second, false)
     }
 
     /// The corner between two runs with free space on their left; on their right, if it is seen from behind.
     fn corner(&self, first: &Run, second: &Run, from_behind: bool) -> Option<PlannedLandmark> {
+        self.corner_at(first.to, first, second, from_behind)
+    }
+
+    fn corner_at(
+        &self,
+        at: PlanPoint,
+        first: &Run,
+        second: &Run,
+        from_behind: bool,
+    ) -> Option<PlannedLandmark> {
         let config = self.config;
         let (u, v) = (first.direction(), second.direction());
         let sine = u.perp(&v);
@@ -186,32 +235,34 @@ impl Finder<'_> {
         let turns = [(sds[0], first), (sds[1], second)].map(|(sd, run)| turn_sd(sd, run.length()));
         let heading_sd = f64::midpoint(turns[0], turns[1]);
         let error = (Covariance::symmetrised(place), heading_sd);
-        Some(self.landmark(kind, owners, first.to, heading, error, free))
+        Some(self.landmark(kind, owners, at, heading, error, free))
     }
 
-    /// The end of something too thin for corners: a short run between two long ones that go back alongside each other.
-    fn thin_end(&self, before: &Run, end: &Run, after: &Run) -> Option<PlannedLandmark> {
+    /// The end of something too thin for corners: a short way to the right between two walls that go back alongside each
+    /// other, straight or in small steps.
+    fn thin_end(&self, before: &Run, between: &[Run], after: &Run) -> Option<PlannedLandmark> {
         let config = self.config;
-        let (u, v, w) = (before.direction(), end.direction(), after.direction());
+        let across = after.from.metres() - before.to.metres();
+        let width = across.norm();
+        let (u, v, w) = (before.direction(), across / width, after.direction());
         let square = (1.0 - config.corner_sine_min.powi(2)).sqrt();
         let turns_right = u.perp(&v) < -square && v.perp(&w) < -square;
-        let long = before.length() >= config.wall_min && after.length() >= config.wall_min;
-        if !turns_right || !long || end.length() >= config.wall_min {
+        let way: f64 = between.iter().map(Run::length).sum();
+        if !turns_right || width >= config.wall_min || way > width + 2.0 * config.bevel_max {
             return None;
         }
-        if self.is_jamb(end.from) || self.is_jamb(end.to) {
+        if self.is_jamb(before.to) || between.iter().any(|run| self.is_jamb(run.to)) {
             return None;
         }
         let outward = (u - w).normalize();
-        let owners = end.owners;
+        let owners = [between.first()?.owners[0], between.last()?.owners[1]];
         let sd = self.plan.owner(owners[0]).tolerance.max(self.plan.owner(owners[1]).tolerance);
-        let place = Matrix2::from_diagonal_element(sd * sd);
-        let middle = middle(end.from, end.to);
         // Two faces tell the direction of one wall.
         let length = before.length().min(after.length());
-        let error = (Covariance::symmetrised(place), turn_sd(sd, length));
+        let error = (Covariance::from_variances([sd * sd, sd * sd]), turn_sd(sd, length));
         let heading = outward.y.atan2(outward.x);
-        Some(self.landmark(LandmarkKind::WallEnd, owners, middle, heading, error, end.length()))
+        let middle = middle(before.to, after.from);
+        Some(self.landmark(LandmarkKind::WallEnd, owners, middle, heading, error, width))
     }
 
     fn of_sheet(&self, runs: &[Run], ends_free: [bool; 2], found: &mut Vec<PlannedLandmark>) {

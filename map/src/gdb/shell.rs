@@ -1,5 +1,7 @@
 //! What is wrong with a solid by itself, wherever it stands.
 
+use std::ops::ControlFlow;
+
 use super::arrangement::touch;
 use super::exact::{PlanPoint, micrometres};
 use super::findings::{FindingKind, Severity};
@@ -8,6 +10,8 @@ use super::snapping::Squares;
 use super::structure::in_place;
 use super::{Point3, Polygon, Polyhedron, Solid};
 
+/// Places where rings meet that are looked at.
+const MEETINGS_MAX: usize = 1_000;
 /// How far a vertex may lie off the plane of its face, metres.
 const FLAT: f64 = 1e-3;
 
@@ -95,13 +99,12 @@ fn of_rings(rings: &[Vec<PlanPoint>]) -> Option<(FindingKind, PlanPoint)> {
             return Some((FindingKind::NoArea, first));
         }
     }
-    meeting(rings)
-        .map(|p| (FindingKind::MeetsItself, p))
-        .or_else(|| misplaced_hole(rings).map(|p| (FindingKind::HoleOutside, p)))
+    meeting(rings).or_else(|| misplaced_hole(rings).map(|p| (FindingKind::HoleOutside, p)))
 }
 
-/// A place where rings meet themselves or each other.
-fn meeting(rings: &[Vec<PlanPoint>]) -> Option<PlanPoint> {
+/// A place where rings meet themselves or each other: the first of those that are looked at. Or one where they start, if they run
+/// beside each other so often that this cannot be told.
+fn meeting(rings: &[Vec<PlanPoint>]) -> Option<(FindingKind, PlanPoint)> {
     // Edges, and which one comes next along the ring.
     let (mut segments, mut next) = (Vec::new(), Vec::new());
     for ring in rings {
@@ -112,7 +115,8 @@ fn meeting(rings: &[Vec<PlanPoint>]) -> Option<PlanPoint> {
         }
     }
     let mut met: Option<PlanPoint> = None;
-    Squares::of(&segments).each_pair(&segments, |a, b| {
+    let mut count = 0;
+    let looked_at = Squares::of(&segments).each_pair(&segments, |a, b| {
         let (s, t) = (segments[a as usize], segments[b as usize]);
         let meets = if next[a as usize] == b || next[b as usize] == a {
             // Neighbours share a vertex, and must not fold back on each other.
@@ -124,9 +128,15 @@ fn meeting(rings: &[Vec<PlanPoint>]) -> Option<PlanPoint> {
         if meets {
             let place = super::exact::crossing(s, t).unwrap_or(s[0]);
             met = Some(met.map_or(place, |other| other.min(place)));
+            count += 1;
         }
+        if count < MEETINGS_MAX { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     });
-    met
+    let unknown = || {
+        let first = rings.first().and_then(|ring| ring.first()).copied().unwrap_or_default();
+        looked_at.is_none().then_some((FindingKind::TooIntricate, first))
+    };
+    met.map(|place| (FindingKind::MeetsItself, place)).or_else(unknown)
 }
 
 /// A vertex of a hole that lies outside of the outer ring, or within another hole. The rings do not meet.

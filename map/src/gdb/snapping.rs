@@ -5,8 +5,13 @@
 //! steps, none passes over a vertex, and the result has no crossings left. It depends on the set of segments only.
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 
 use super::exact::{PlanPoint, along, crossing, meets_pixel, nearest_quotient};
+
+/// Pairs of segments that are looked at: a few for each where buildings are drawn. They are the square of the number of
+/// segments where these are long and run beside each other.
+const PAIRS_MAX: u64 = 50_000_000;
 
 /// A square of the grid that finds neighbours: column and row.
 type Square = (i64, i64);
@@ -33,13 +38,13 @@ impl Squares {
         Self { side, entries }
     }
 
-    /// Calls `meet` for pairs of segments whose boxes meet, at least once for each that share a point; tells
-    /// how many pairs were looked at.
+    /// Calls `meet` for pairs of segments whose boxes meet, at least once for each that share a point, until it breaks;
+    /// tells how many pairs were looked at. `None` after more than [`PAIRS_MAX`]: then not all were.
     pub(super) fn each_pair(
         &self,
         segments: &[[PlanPoint; 2]],
-        mut meet: impl FnMut(u32, u32),
-    ) -> u64 {
+        mut meet: impl FnMut(u32, u32) -> ControlFlow<()>,
+    ) -> Option<u64> {
         let mut looked_at = 0;
         let mut members: Vec<(i64, u32)> = Vec::new();
         for same in self.entries.chunk_by(|a, b| a.0 == b.0) {
@@ -56,13 +61,19 @@ impl Squares {
                 for (_, second) in others {
                     looked_at += 1;
                     let [c, d] = segments[*second as usize];
-                    if c.y.min(d.y) <= high && c.y.max(d.y) >= low {
-                        meet(*first, *second);
+                    if c.y.min(d.y) <= high
+                        && c.y.max(d.y) >= low
+                        && meet(*first, *second).is_break()
+                    {
+                        return Some(looked_at);
                     }
+                }
+                if looked_at > PAIRS_MAX {
+                    return None;
                 }
             }
         }
-        looked_at
+        Some(looked_at)
     }
 }
 
@@ -98,18 +109,17 @@ pub(super) struct Snapped {
 }
 
 /// Bends segments (none of length 0) so that they meet only at their ends. `None` if there are more than `most`
-/// crossings or parts: they are the square of the number of segments if these are drawn so.
+/// crossings or parts, or pairs without end: they are the square of the number of segments if these are drawn so.
 pub(super) fn snap(segments: &[[PlanPoint; 2]], most: usize) -> Option<Snapped> {
     let squares = Squares::of(segments);
     let mut pixels: Vec<PlanPoint> = segments.iter().flatten().copied().collect();
     let mut crossings = 0;
     let mut pairs = squares.each_pair(segments, |a, b| {
-        if crossings < most {
-            let crossing = crossing(segments[a as usize], segments[b as usize]);
-            crossings += usize::from(crossing.is_some());
-            pixels.extend(crossing);
-        }
-    });
+        let crossing = crossing(segments[a as usize], segments[b as usize]);
+        crossings += usize::from(crossing.is_some());
+        pixels.extend(crossing);
+        if crossings < most { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    })?;
     if crossings >= most {
         return None;
     }

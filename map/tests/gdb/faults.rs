@@ -91,6 +91,20 @@ fn prism(outer: &[[f64; 2]], holes: &[&[[f64; 2]]]) -> Vec<K> {
     of([Object::of(Kind::Machine, vec![solid])]).into_iter().map(|finding| finding.kind).collect()
 }
 
+/// Edges without end cost no time without end, whether they meet each other or not.
+#[test]
+fn tangles_and_combs_are_named_without_looking_at_all_of_them() {
+    let tangle: Vec<[f64; 2]> =
+        (0..60_000).map(|k| [f64::from(k % 7), f64::from(k % 11)]).collect();
+    assert_eq!(prism(&tangle, &[]), [K::MeetsItself]);
+    // Slanting teeth, each beside thousands of others.
+    let tooth =
+        |k: u32| [f64::from(k / 2) * 0.001 + f64::from(k % 2) * 40.0, f64::from(k % 2) * 40.0];
+    let up = (0..30_000).map(|k| [tooth(k)[0] + f64::from(k % 2) * 2e-4, tooth(k)[1]]);
+    let comb: Vec<[f64; 2]> = up.chain([[60.0, -1.0], [-1.0, -1.0]]).collect();
+    assert_eq!(prism(&comb, &[]), [K::TooIntricate]);
+}
+
 #[test]
 fn polygons_that_meet_themselves_and_holes_outside_are_named() {
     let square = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]];
@@ -205,6 +219,7 @@ fn every_sentence_says_what_to_do() {
         K::RepeatedVertex,
         K::NoArea,
         K::MeetsItself,
+        K::TooIntricate,
         K::HoleOutside,
         K::NotPlane { off: 0.002 },
         K::OpenShell { edges: 3 },

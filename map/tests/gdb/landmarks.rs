@@ -3,7 +3,8 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use mapfold_map::gdb::{
-    Kind, LandmarkConfig, Object, Placement, Plan, PlannedLandmark, Point3, Shape, Solid, landmarks,
+    Kind, LandmarkConfig, Object, Placement, Plan, PlannedLandmark, Point3, Polygon, Shape, Solid,
+    landmarks,
 };
 use mapfold_map::geometry::wrap;
 
@@ -209,4 +210,32 @@ fn round_things_have_no_corners() {
     let plan = plan([Object::of(Kind::Machine, vec![Solid::Cylinder(cylinder)])], 0.5);
     assert_eq!(seen(&plan), []);
     assert!(plan.outlines()[0].vertices().count() as f64 > PI / FRAC_PI_2);
+}
+
+/// What is cut off a corner, and steps of millimetres at the end of a wall, are details of what a robot sees; more is not.
+#[test]
+fn a_corner_that_lacks_a_little_is_a_corner_and_an_end_with_steps_an_end() {
+    let thing = |ring: &[[f64; 2]]| Object {
+        shape: Shape::Own(vec![Solid::Prism {
+            base: Polygon::simple(ring.iter().copied()),
+            lower: 0.0,
+            upper: 1.0,
+        }]),
+        ..block(Kind::Furniture, [0.0; 2], [1.0; 2], [0.0, 1.0])
+    };
+    let bevelled =
+        |cut: f64| thing(&[[0.0, 0.0], [2.0, 0.0], [2.0, 1.0 - cut], [2.0 - cut, 1.0], [0.0, 1.0]]);
+    let corners = |object: Object| -> Vec<[f64; 2]> {
+        let found = of(&plan([object], 0.5));
+        assert!(found.iter().all(|l| l.id.kind == ConvexCorner));
+        found.iter().map(|l| [l.landmark.at.x, l.landmark.at.y]).collect()
+    };
+    let square = corners(thing(&[[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]));
+    assert_eq!(square.len(), 4);
+    assert_eq!(corners(bevelled(0.03)), square);
+    assert_eq!(corners(bevelled(0.1)).len(), 3, "a bevel of 14 cm is neither corner nor wall");
+    let stepped = [[0.0, 0.0], [2.0, 0.0], [2.0, 0.05], [2.02, 0.05], [2.02, 0.1], [0.0, 0.1]];
+    let found = of(&plan([thing(&stepped)], 0.5));
+    let end = found.iter().find(|l| l.id.kind == WallEnd && l.landmark.at.x > 1.0).unwrap();
+    assert!((end.landmark.at.x - 2.01).abs() < 1e-6 && end.landmark.direction.abs() < 1e-6);
 }

@@ -184,7 +184,9 @@ impl ApiError {
                 413,
                 "body_too_large",
                 format!(
-                    "A body may have {limit_bytes} bytes here once unpacked; send less at once."
+                    "A body may have {limit_bytes} bytes here once unpacked; send less at once, or have the server take more: \
+                    `upload_bytes` and `upload_compressed_bytes` under `[http]` of its configuration (`body_bytes` for all that \
+                    is no upload)."
                 ),
             ),
             Self::TooManyItems { limit } => {

@@ -22,6 +22,7 @@ mod engines;
 mod events;
 mod exports;
 mod gdb;
+mod hand_checked;
 mod imports;
 mod landmarks;
 mod layers;

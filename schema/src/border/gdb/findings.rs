@@ -20,6 +20,7 @@ pub fn finding_code(kind: &FindingKind) -> &'static str {
         FindingKind::RepeatedVertex => "repeated_vertex",
         FindingKind::NoArea => "no_area",
         FindingKind::MeetsItself => "meets_itself",
+        FindingKind::TooIntricate => "too_intricate",
         FindingKind::HoleOutside => "hole_outside",
         FindingKind::NotPlane { .. } => "not_plane",
         FindingKind::OpenShell { .. } => "open_shell",

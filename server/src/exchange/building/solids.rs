@@ -236,7 +236,8 @@ impl<'a> Walls<'a> {
 
     /// How far a wall that comes to a vertex in the direction `along` goes beyond it.
     ///
-    /// Two walls that turn by an angle a meet at their outer corner t/2 tan(a/2) beyond the vertex. Where others go on to
+    /// Two walls that turn by an angle a meet at their outer corner t/2 tan(a/2) beyond the vertex; from a right angle on,
+    /// their square ends would come out of each other's outer faces there, and stop at t/2 cot(a/2). Where others go on to
     /// both sides, the wall ends within them. A wall that goes on over a door ends there: what the door opens is the
     /// piece over it, which overlaps its neighbours.
     fn beyond(&self, vertex: usize, along: Point, is_over_door: bool) -> f64 {
@@ -258,7 +259,8 @@ impl<'a> Walls<'a> {
             }
             (left, right) = (left || sine > STRAIGHT, right || sine < -STRAIGHT);
             let turn = sine.abs().atan2(cosine);
-            let miter = if cosine < 0.0 { 1.0 } else { (turn / 2.0).tan() };
+            let half = (turn / 2.0).tan();
+            let miter = half.min(1.0 / half);
             reach = reach.max((THICKNESS_M / 2.0 * miter).max(OVERLAP_M));
         }
         if left && right { 0.0 } else { reach }
@@ -273,13 +275,15 @@ impl<'a> Walls<'a> {
             return None;
         }
         let along = (q - p) / length;
+        // A wall that goes on straight takes nothing, one at a right angle half of its thickness.
         let taken = |vertex: usize| {
             let others = self.at.get(&vertex).into_iter().flatten();
-            let across = others.into_iter().any(|(other, _)| {
+            let sines = others.map(|(other, _)| {
                 let away = self.points[*other] - self.points[vertex];
-                away.norm() >= LENGTH_MIN_M && along.perp(&away).abs() / away.norm() > STRAIGHT
+                let length = away.norm();
+                if length < LENGTH_MIN_M { 0.0 } else { along.perp(&away).abs() / length }
             });
-            if across { THICKNESS_M / 2.0 } else { 0.0 }
+            THICKNESS_M / 2.0 * sines.fold(0.0, f64::max)
         };
         let (first, last) = (taken(from), taken(to));
         (length - first - last > LENGTH_MIN_M).then(|| [p + along * first, q - along * last])
