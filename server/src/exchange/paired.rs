@@ -28,8 +28,12 @@ impl WallConfig {
     };
 }
 
-/// Pairs of lines that are looked at; beyond, lines are taken one by one.
-const PAIRS_MAX: usize = 1_000_000;
+/// Times that two lines are held against each other; beyond, lines are taken one by one.
+const COMPARED_MAX: usize = 50_000_000;
+/// Pairs of parallel lines near each other, each as often as it was met.
+const PAIRS_MAX: usize = 2_000_000;
+/// Squares that lines may stand in; with more, squares are larger.
+const SQUARES_MAX: f64 = 2_000_000.0;
 /// Stretches that a line may be broken into; of one that is in more pieces, no more is paired.
 const FREE_MAX: usize = 256;
 /// Leftovers times walls that are compared with each other.
@@ -129,55 +133,11 @@ pub(super) fn walls(lines: &[WallLine], config: &WallConfig) -> Walls {
     found
 }
 
-/// Pairs that may be walls, thin ones first, and of the same thickness long ones first. By direction and offset, so that
-/// only neighbours meet.
+/// Pairs that may be walls, thin ones first, and of the same thickness long ones first.
 fn candidates(lines: &[Line], config: &WallConfig) -> (Vec<Candidate>, bool) {
-    let Some(first) = lines.first() else { return (Vec::new(), false) };
-    let middle = first.from;
-    let reach = lines.iter().map(|l| (l.from - middle).norm() + l.length).fold(0.0, f64::max);
-    // Directions modulo half a turn, in steps of twice the tolerance; a line also meets those of the step before.
-    let step = 2.0 * config.parallel_sine;
-    let steps = (std::f64::consts::PI / step).ceil() as i64;
-    let direction = |line: &Line| {
-        let angle = line.along.y.atan2(line.along.x).rem_euclid(std::f64::consts::PI);
-        (angle / step).floor() as i64 % steps
-    };
-    let mut order: Vec<(i64, usize)> =
-        lines.iter().enumerate().map(|(i, l)| (direction(l), i)).collect();
-    order.sort_unstable();
-    let slack = config.thickness_max_m + reach * 2.0 * step;
-    let (mut candidates, mut looked_at) = (Vec::new(), 0);
-    for bucket in order.chunk_by(|a, b| a.0 == b.0) {
-        let key = bucket[0].0;
-        let next = (key + 1) % steps;
-        let from = order.partition_point(|(k, _)| *k < next);
-        let neighbours = &order[from..];
-        let neighbours = &neighbours[..neighbours.partition_point(|(k, _)| *k == next)];
-        let angle = (key as f64 + 1.0) * step;
-        let normal = Point::new(-angle.sin(), angle.cos());
-        let offset = |i: usize| normal.dot(&(lines[i].from - middle));
-        let mut near: Vec<(f64, usize, bool)> =
-            bucket.iter().map(|(_, i)| (offset(*i), *i, true)).collect();
-        if next != key {
-            near.extend(neighbours.iter().map(|(_, i)| (offset(*i), *i, false)));
-        }
-        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        for (k, (here, a, a_own)) in near.iter().enumerate() {
-            for (there, b, b_own) in &near[k + 1..] {
-                if there - here > slack {
-                    break;
-                }
-                if !a_own && !b_own {
-                    continue;
-                }
-                looked_at += 1;
-                if looked_at > PAIRS_MAX {
-                    return (Vec::new(), true);
-                }
-                candidates.extend(facing(lines, *a, *b, config));
-            }
-        }
-    }
+    let Some(pairs) = neighbours(lines, config) else { return (Vec::new(), true) };
+    let facing = |(a, b): (u32, u32)| facing(lines, a as usize, b as usize, config);
+    let mut candidates: Vec<Candidate> = pairs.into_iter().filter_map(facing).collect();
     candidates.sort_by(|a: &Candidate, b| {
         let thickness = |c: &Candidate| (c.distance * 100.0).round() as i64;
         thickness(a)
@@ -186,6 +146,57 @@ fn candidates(lines: &[Line], config: &WallConfig) -> (Vec<Candidate>, bool) {
             .then(a.lines.cmp(&b.lines))
     });
     (candidates, false)
+}
+
+/// Parallel lines that come as near to each other as the faces of a wall, by place: `None` if there are too many.
+///
+/// Each line stands in the squares of points along it, no farther apart than half a square. So no point of it is more
+/// than a quarter of a square from one of them, and two lines that come nearer than that to each other have squares that
+/// touch.
+fn neighbours(lines: &[Line], config: &WallConfig) -> Option<Vec<(u32, u32)>> {
+    let mut side = 4.0 * config.thickness_max_m;
+    let points = |line: &Line, side: f64| (2.0 * line.length / side).ceil();
+    while lines.iter().map(|line| points(line, side) + 1.0).sum::<f64>() > SQUARES_MAX {
+        side *= 2.0;
+    }
+    let mut places: Vec<((i64, i64), u32)> = Vec::new();
+    for (number, line) in lines.iter().enumerate() {
+        let steps = points(line, side);
+        for k in 0..=steps as u32 {
+            let p = line.from + line.along * (line.length * f64::from(k) / steps);
+            places
+                .push((((p.x / side).floor() as i64, (p.y / side).floor() as i64), number as u32));
+        }
+    }
+    places.sort_unstable();
+    places.dedup();
+    let square = |at: (i64, i64)| {
+        let from = places.partition_point(|(place, _)| *place < at);
+        let here = &places[from..];
+        &here[..here.partition_point(|(place, _)| *place == at)]
+    };
+    let (mut pairs, mut compared) = (Vec::new(), 0_usize);
+    for own in places.chunk_by(|a, b| a.0 == b.0) {
+        let (x, y) = own[0].0;
+        // Those before look at this one.
+        let others = [(x, y + 1), (x + 1, y - 1), (x + 1, y), (x + 1, y + 1)].map(square);
+        for (k, (_, a)) in own.iter().enumerate() {
+            let with = own[k + 1..].iter().chain(others.into_iter().flatten());
+            for (_, b) in with.filter(|(_, b)| b != a) {
+                compared += 1;
+                let [first, second] = [a, b].map(|k| &lines[*k as usize]);
+                if first.along.perp(&second.along).abs() <= config.parallel_sine {
+                    pairs.push((*a.min(b), *a.max(b)));
+                }
+            }
+            if compared > COMPARED_MAX || pairs.len() > PAIRS_MAX {
+                return None;
+            }
+        }
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    Some(pairs)
 }
 
 /// Whether two lines face each other at the thickness of a wall.
@@ -358,6 +369,21 @@ mod tests {
         assert!(
             found.found.iter().all(|wall| !wall.is_double && (wall.thickness - 0.05).abs() < 1e-12)
         );
+    }
+
+    /// Corridors of a vast building: every pair of faces is far from all others, however long the list of lines.
+    #[test]
+    fn lines_of_a_vast_building_meet_their_neighbours_only() {
+        let mut drawn = Vec::new();
+        for k in 0..3000 {
+            let (x, y) = (f64::from(k % 60) * 10.0, f64::from(k / 60) * 8.0);
+            drawn.push([x, y, x + 9.0, y]);
+            drawn.push([x + 9.0, y + 0.15, x, y + 0.15]);
+        }
+        let found = walls(&lines(&drawn), &WallConfig::STANDARD);
+        assert!(!found.is_crowded);
+        assert_eq!(found.found.len(), 3000);
+        assert!(found.found.iter().all(|wall| (wall.thickness - 0.15).abs() < 1e-9));
     }
 
     #[test]

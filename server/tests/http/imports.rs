@@ -1,9 +1,12 @@
 //! Maps of other programs as a level's prior: told, taken, replaced, removed, and seen everywhere.
 
 use std::io::{Cursor, Write};
+use std::process::Command;
 
 use mapfold_schema::route;
-use mapfold_schema::v1::{Import, ImportPage, ImportReport, RasterChanges, Receipt, TilePlace};
+use mapfold_schema::v1::{
+    Import, ImportPage, ImportReport, ModelFormat, ModelImport, RasterChanges, Receipt, TilePlace,
+};
 use reqwest::Method;
 use reqwest::header::IF_NONE_MATCH;
 use zip::ZipWriter;
@@ -222,4 +225,55 @@ async fn many_tiles_come_in_one_answer_the_same_as_one_by_one() {
         let refused = floor.client.get(&format!("{batch}{bad}")).await;
         assert_eq!(refused.code(400), "query_invalid", "{bad}");
     }
+}
+
+/// A wall of 40 by 4 cells, with a doorway of 16 cells in it.
+fn map_of_a_wall() -> (Vec<u8>, Vec<u8>) {
+    let yaml = "image: map.pgm\nresolution: 0.05\norigin: [1.0, 2.0, 0.0]\nnegate: 0\n\
+                occupied_thresh: 0.65\nfree_thresh: 0.196\n";
+    let mut image = b"P5\n60 20\n255\n".to_vec();
+    for row in 0..20 {
+        let is_wall = |column: i32| {
+            (8..12).contains(&row) && (10..50).contains(&column) && !(22..38).contains(&column)
+        };
+        image.extend((0..60).map(|column| if is_wall(column) { 0 } else { 254 }));
+    }
+    (yaml.as_bytes().to_vec(), image)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_occupied_cells_of_a_map_become_walls_of_the_draft_over_http_and_on_the_command_line() {
+    let server = Server::start().await;
+    let floor = Level::create(&server.admin()).await;
+    let (yaml, image) = map_of_a_wall();
+    let zip = zipped(&[("map.yaml", &yaml), ("map.pgm", &image)]);
+    let client = &floor.client;
+    let told: ModelImport =
+        post(&floor, client, "?into=gdb&preview=true", zip.clone()).await.expect(200).data();
+    assert_eq!((told.report.format, told.preview.unwrap().new), (ModelFormat::Nav2, 2));
+    assert_eq!(floor.describe().await.revision, 0);
+    let made: ModelImport = post(&floor, client, "?into=gdb", zip.clone()).await.expect(201).data();
+    let entry = made.answer.unwrap().entry.unwrap();
+    assert_eq!((entry.revision, entry.put), (1, 2));
+    let bounds = made.report.bounds.unwrap();
+    // From cell 10 to 50 across and 8 to 12 up, about an origin of (1, 2) m.
+    let found = [bounds.min_x_m, bounds.max_x_m, bounds.min_y_m, bounds.max_y_m];
+    assert!(found.iter().zip([1.5, 3.5, 2.4, 2.6]).all(|(a, b)| (a - b).abs() < 0.02), "{found:?}");
+    let again: ModelImport = post(&floor, client, "?into=gdb", zip).await.expect(200).data();
+    assert_eq!(again.answer.unwrap().entry, None, "taken twice is taken once");
+    let page: ImportPage = client.get(&floor.path(route::IMPORTS)).await.expect(200).data();
+    assert_eq!(page.imports.len(), 0, "it is no prior");
+
+    let folder = server.shutdown().await;
+    std::fs::write(folder.path().join("map.yaml"), &yaml).unwrap();
+    std::fs::write(folder.path().join("map.pgm"), &image).unwrap();
+    let run = |words: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_mapfold-server"));
+        command.args(words).arg("--data-dir").arg(folder.path().join("data"));
+        let output = command.current_dir(folder.path()).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let told = run(&["import", "map.yaml", "--into-gdb", "--site", "plant", "--level", "floor"]);
+    assert!(told.contains("2 wall") && told.contains("had all of it already"), "{told}");
 }
