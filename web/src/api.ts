@@ -2,6 +2,7 @@
 // the server refused (with its problem), or it could not be reached.
 
 import type { ModelView } from "./model";
+import type { FileTold } from "./model_files";
 import type { Place } from "./permalink";
 import type { Evidence, PictureAddress } from "./pyramid";
 import type {
@@ -109,6 +110,8 @@ export interface Api {
   plan: (place: Place, view: ModelView, signal: AbortSignal) => Promise<GdbPlan>;
   /** Landmarks at a height, those of what is published and those that robots taught; what changed of them after a revision. */
   landmarks: (place: Place, heightM: number, since: number, signal: AbortSignal) => Promise<LandmarkTable>;
+  /** Takes a model's file into the draft, or tells what is in it. */
+  takeModel: (place: Place, file: { body: Blob; mediaType: string; query: Readonly<Record<string, string>> }, signal: AbortSignal | null) => Promise<FileTold>;
   /** What robots found against what is published, cut at a height. */
   changes: (place: Place, heightM: number) => Promise<ModelChanges>;
   /** What is to become of one of them. */
@@ -242,6 +245,8 @@ export function createApi(browser: Browser): Api {
     plan: (place, { heightM, state }, signal) =>
       askJson(`${levelPath(place)}/gdb/plan?height_m=${heightM}&state=${state}`, { signal }),
     landmarks: (place, heightM, since, signal) => askJson(`${levelPath(place)}/landmarks?height_m=${heightM}&since=${since}`, { signal }),
+    takeModel: (place, { body, mediaType, query }, signal) =>
+      askJson(`${levelPath(place)}/imports?${new URLSearchParams(query).toString()}`, { method: "POST", headers: { "content-type": mediaType }, body, signal }),
     changes: (place, heightM) => askJson(`${levelPath(place)}/changes?height_m=${heightM}`),
     answerChange: (place, id, answer, heightM) =>
       askJson(`${levelPath(place)}/changes/${encodeURIComponent(id)}?height_m=${heightM}`, posted({ answer })),

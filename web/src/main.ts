@@ -8,6 +8,7 @@ import { createDraftActions } from "./drafting";
 import { createEditActions } from "./editing/acting";
 import { commanded } from "./editing/commands";
 import { commandOf } from "./editing/keys";
+import { createWindowMemory, locksOf } from "./editing/windows";
 import { createFacts } from "./facts";
 import { followLevel } from "./feed";
 import { createImportActions } from "./importing";
@@ -18,6 +19,7 @@ import { createChangesCard } from "./panels/changes_card";
 import { createContributionsCard } from "./panels/contributions_card";
 import { createEditBar } from "./panels/edit_bar";
 import { createEditCard } from "./panels/edit_card";
+import { createFilesCard } from "./panels/files_card";
 import { createHeader } from "./panels/header";
 import { createLayersCard } from "./panels/layers_card";
 import { createLevelCard } from "./panels/level_card";
@@ -36,6 +38,7 @@ import { createLogActions } from "./reverting";
 import { resume, signIn, signOut } from "./session";
 import { initialState, samePlace } from "./state";
 import { createStore } from "./store";
+import { createFileActions } from "./taking";
 import { uuidFrom } from "./uuid";
 
 /** How often the ages on the page are brought up to date. */
@@ -88,14 +91,29 @@ const overMap = byId("over-map");
 const log = createLogActions({ api, state: store.state, dispatch, uuid });
 const prior = createImportActions({ api, state: store.state, dispatch });
 const draft = createDraftActions({ api, state: store.state, dispatch });
+const takenIn = createFileActions({
+  api,
+  state: store.state,
+  dispatch,
+  onTaken: () => {
+    model?.look();
+    draft.refresh();
+  },
+});
 const changes = createChangeActions({ api, state: store.state, dispatch, timers });
-const edit = createEditActions({ api, state: store.state, dispatch, memory: window.localStorage, timers, uuid });
+const memory = createWindowMemory({ shared: window.localStorage, own: window.sessionStorage, locks: locksOf((navigator as Partial<Navigator>).locks), newId: uuid });
+const edit = createEditActions({ api, state: store.state, dispatch, memory, timers, uuid });
+// What a closed window has left is found once it is known which ones live.
+void memory.ready.then(() => {
+  if (!store.state().editing.on) edit.arrived();
+});
 const draws = [
   createHeader({ parent: byId("header"), store, onSignOut: () => void signOut(api, dispatch) }),
   createLevelCard(panels),
   createRobotsCard(panels, { store, theme }),
   createLayersCard(panels, store),
   createModelCard(panels, { store, actions: draft }),
+  createFilesCard(panels, takenIn),
   createChangesCard(panels, { store, actions: changes }),
   createPriorCard(panels, prior),
   createContributionsCard(panels, { store, theme, onOpenLog: log.open }),

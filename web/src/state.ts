@@ -10,6 +10,7 @@ import { NO_CHANGES, type ChangesState } from "./changes";
 import { NO_DRAFT, type DraftState } from "./drafts";
 import { NO_EDITING, type EditingState } from "./editing";
 import { NO_IMPORTS, type ImportsState } from "./imports";
+import { NO_FILES, type FilesState } from "./model_files";
 import { NO_MODEL, type ModelState, type ModelView } from "./model";
 import { NO_LOG, type LogState } from "./reverts";
 import type {
@@ -64,6 +65,7 @@ export interface State {
   contributions: readonly ContributionEntry[] | null;
   log: LogState;
   imports: ImportsState;
+  files: FilesState;
   model: ModelState;
   draft: DraftState;
   changes: ChangesState;
@@ -94,6 +96,7 @@ export type Event =
   | { kind: "contributions"; contributions: readonly ContributionEntry[] }
   | { kind: "log"; log: Partial<LogState> }
   | { kind: "imports"; imports: Partial<ImportsState> }
+  | { kind: "files"; files: Partial<FilesState> }
   | { kind: "draft"; draft: Partial<DraftState> }
   | { kind: "changes"; changes: Partial<ChangesState> }
   | { kind: "editing"; editing: Partial<EditingState> }
@@ -122,6 +125,7 @@ const NO_LEVEL = {
   contributions: null,
   log: NO_LOG,
   imports: NO_IMPORTS,
+  files: NO_FILES,
   draft: NO_DRAFT,
   changes: NO_CHANGES,
   editing: NO_EDITING,
@@ -188,6 +192,8 @@ export function update(state: State, event: Event): State {
       return { ...state, log: { ...state.log, ...event.log } };
     case "imports":
       return { ...state, imports: { ...state.imports, ...event.imports } };
+    case "files":
+      return { ...state, files: { ...state.files, ...event.files } };
     case "draft":
       return { ...state, draft: { ...state.draft, ...event.draft } };
     case "changes":

@@ -94,6 +94,9 @@ export type LandmarkKind = Wire["LandmarkKind"];
 export type Landmark = Exactly<Wire["Landmark"], { at_m: [number, number]; covariance: Matrix3 }>;
 export type LandmarkTable = Exactly<Wire["LandmarkTable"], { landmarks: Landmark[] }>;
 
+export type BuildingImport = Exactly<Wire["BuildingImport"], { preview?: GdbPreview | null }>;
+export type ModelImport = Exactly<Wire["ModelImport"], { preview?: GdbPreview | null }>;
+
 export type NewRevert = Wire["NewRevert"];
 export type Revert = Wire["Revert"];
 export type RevertPage = Wire["RevertPage"];
