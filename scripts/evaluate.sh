@@ -2,7 +2,7 @@
 # Calibrates simulated scanners and measures their corrected ranges; finds lines in simulated scans and
 # holds them against the walls; scores grids of sonars and scanners and draws a corridor; compares what the
 # maps of simulated fleets claim with truth; moves shelves; removes, adds and moves
-# things and asks what is told of it against the model; cuts vast models; times what a server answers about vast rasters; asks
+# things and asks what is told of it against the model; takes real buildings in; cuts vast models; times what a server answers about vast rasters; asks
 # for places among landmarks; times the
 # fold of vast floors; replays every log there is through real servers on SQLite and PostgreSQL and
 # measures the maps; and rewrites the tables in BENCHMARKS.md. Logs and plans that may not be committed
@@ -19,6 +19,7 @@ evaluate="${CARGO_TARGET_DIR:-target}/release/mapfold-evaluate"
 "$evaluate" change --report BENCHMARKS.md
 "$evaluate" differences --report BENCHMARKS.md
 "$evaluate" plans --report BENCHMARKS.md
+if [ -d ../shared/data/plans ]; then "$evaluate" buildings --report BENCHMARKS.md --data ../shared/data --pictures docs/buildings; fi
 "$evaluate" serving --report BENCHMARKS.md
 "$evaluate" structures --report BENCHMARKS.md
 "$evaluate" growth --report BENCHMARKS.md --data ../shared/data

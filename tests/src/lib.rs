@@ -21,6 +21,7 @@
 //! * [`range`]: simulated heads, their calibration, and how well their ranges are corrected.
 //! * [`change`]: how soon a map follows what has moved.
 //! * [`differences`]: what is told of a floor that is not as its model, and how soon.
+//! * [`buildings`]: what comes of real buildings that are taken in as models.
 //! * [`plans`]: what vast models cost.
 //! * [`serving`]: how long a server takes to answer about small and vast rasters.
 //! * [`structures`]: whether and how fast a place is found among landmarks.
@@ -29,6 +30,7 @@
 //!   into a page of text.
 
 pub mod api;
+pub mod buildings;
 pub mod carmen;
 pub mod change;
 pub mod coverage;

@@ -6,8 +6,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use mapfold_tests::{
-    change, differences, evaluation, extraction, figure, growth, honesty, plans, range, raster,
-    serving, speed, structures,
+    buildings, change, differences, evaluation, extraction, figure, growth, honesty, plans, range,
+    raster, serving, speed, structures,
 };
 
 /// Measures Mapfold and rewrites the tables of a report between their markers.
@@ -65,6 +65,18 @@ enum Command {
         /// The page with the markers `differences`
         #[arg(long, value_name = "FILE")]
         report: PathBuf,
+    },
+    /// Takes real buildings into a server, and counts what comes of them
+    Buildings {
+        /// The page with the markers `buildings`
+        #[arg(long, value_name = "FILE")]
+        report: PathBuf,
+        /// The folder with the real data, in `plans/`
+        #[arg(long, value_name = "DIR")]
+        data: PathBuf,
+        /// The folder that pictures are written to
+        #[arg(long, value_name = "DIR")]
+        pictures: PathBuf,
     },
     /// Cuts models of up to 20 000 walls, and times what is made of them
     Plans {
@@ -131,6 +143,9 @@ async fn main() -> ExitCode {
         Command::Extraction { report, data } => extraction::extraction(&report, data.as_deref()),
         Command::Change { report } => change::table(&report),
         Command::Differences { report } => differences::table(&report),
+        Command::Buildings { report, data, pictures } => {
+            buildings::table(&report, &data, &pictures).await
+        }
         Command::Plans { report } => plans::table(&report),
         Command::Serving { report } => serving::tables(&report).await,
         Command::Structures { report } => structures::table(&report),
