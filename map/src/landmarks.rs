@@ -7,18 +7,22 @@
 //! none. Never a confident guess: one pose is answered only if all others together are a thousand times
 //! less likely.
 //!
+//! Of many landmarks [`select`] chooses those that are good to find oneself by.
+//!
 //! Landmarks come from walls, those of one look ([`landmarks_of_look`]) or of the map ([`landmarks_of_map`]); those of
 //! the a-priori model come from `gdb`, and what the model knows the map need not tell again ([`told_by`]).
 //! Knows nothing of scans.
 
 mod faces;
 mod fit;
+mod goodness;
 mod grid;
 mod hypothesis;
 mod learned;
 mod locate;
 mod pairs;
 mod same;
+mod selection;
 mod sight;
 mod table;
 
@@ -26,9 +30,11 @@ use crate::geometry::{Covariance, Point, difference};
 
 pub use faces::{FacesConfig, landmarks_of_look};
 pub use fit::{Correspondence, FitError, PoseFit, fit_pose};
+pub use goodness::{Applied, Goodness, GoodnessConfig, Traits};
 pub use learned::{LearnedConfig, LearnedId, LearnedLandmark, landmarks_of_map};
 pub use locate::{Candidate, Fix, LocateConfig, locate};
 pub use same::{SameConfig, told_by};
+pub use selection::{Selectable, Selected, select, select_by_goodness};
 pub use sight::{Obstacles, Sight};
 pub use table::LandmarkTable;
 

@@ -24,6 +24,7 @@
 //! * [`buildings`]: what comes of real buildings that are taken in as models.
 //! * [`plans`]: what vast models cost.
 //! * [`serving`]: how long a server takes to answer about small and vast rasters.
+//! * [`localization`]: how well a robot is tracked, and whether it notices that it is lost.
 //! * [`structures`]: whether and how fast a place is found among landmarks.
 //! * [`figure`]: a hallway's map as a picture.
 //! * [`evaluation`], [`speed`], [`statistics`], [`report`]: `mapfold-evaluate`, which writes tables between markers
@@ -45,6 +46,7 @@ pub mod floor;
 pub mod growth;
 pub mod honesty;
 pub mod level;
+pub mod localization;
 pub mod meter;
 pub mod page;
 pub mod plane;

@@ -6,8 +6,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use mapfold_tests::{
-    buildings, change, differences, evaluation, extraction, figure, growth, honesty, plans, range,
-    raster, serving, speed, structures,
+    buildings, change, differences, evaluation, extraction, figure, growth, honesty, localization,
+    plans, range, raster, serving, speed, structures,
 };
 
 /// Measures Mapfold and rewrites the tables of a report between their markers.
@@ -96,6 +96,12 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         report: PathBuf,
     },
+    /// Repeats the paper's experiment: tracks simulated robots on 15 m with nine stops, and carries some of them away
+    Localization {
+        /// The page with the markers `localization`, `kidnapped` and `selection`
+        #[arg(long, value_name = "FILE")]
+        report: PathBuf,
+    },
     /// Draws a hallway's vector map from a few scans of the committed log
     Figure {
         /// The SVG to write
@@ -149,6 +155,7 @@ async fn main() -> ExitCode {
         Command::Plans { report } => plans::table(&report),
         Command::Serving { report } => serving::tables(&report).await,
         Command::Structures { report } => structures::table(&report),
+        Command::Localization { report } => localization::tables(&report),
         Command::Figure { out } => figure::write(&out).await.map(|()| Vec::new()),
         Command::Raster { report, picture } => raster::raster(&report, &picture),
         Command::Benches { report, criterion } => speed::benches(&report, &criterion),

@@ -15,6 +15,7 @@ mod recorder;
 mod scanner;
 mod sonar;
 mod sweep;
+mod wheels;
 mod world;
 
 pub use drive::{Odometry, Pose, Stop, drive};
@@ -25,4 +26,5 @@ pub use recorder::{Recording, record};
 pub use scanner::Scanner;
 pub use sonar::SonarRing;
 pub use sweep::{Errors, Fan, REACH_M, Sweep};
+pub use wheels::{Platform, way_points};
 pub use world::{World, hall, office};

@@ -99,6 +99,13 @@ impl Filter {
         self.level_from_robot = self.level_from_robot.compose(step);
     }
 
+    /// Allows for an error of the last step, ahead, aside and in heading, with these deviations.
+    pub(super) fn slip(&mut self, sds: &[f64; 3]) {
+        let slip = Covariance::from_variances(sds.map(|sd| sd * sd));
+        let by = UncertainPose { pose: Pose::identity(), covariance: slip };
+        self.moved(&by);
+    }
+
     fn cross(&self, error: MapError) -> Matrix3<f64> {
         self.kept.get(&error).map_or_else(Matrix3::zeros, |kept| kept.cross)
     }

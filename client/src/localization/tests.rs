@@ -280,6 +280,52 @@ fn a_robot_that_is_carried_away_is_lost_after_five_looks() {
 }
 
 #[test]
+fn a_corridor_that_fits_proves_nothing_along_itself() {
+    let walls = [
+        Wall::new((30.0, 1.0), (0.0, 1.0)),
+        Wall::new((0.0, -1.0), (30.0, -1.0)),
+        Wall::new((30.0, -1.0), (30.0, 1.0)),
+    ];
+    let reference = known(&walls);
+    let believed = Pose::new(22.0, 0.0, 0.0);
+    let truth = Pose::new(24.0, 0.0, 0.0);
+    let mut tracker = Tracker::new(fix(believed, [0.02, 0.02, 0.01]), TrackerConfig::STANDARD);
+    for _ in 0..5 {
+        // Two long walls fit; the short one ahead is two metres nearer than it should be.
+        let seen: Vec<_> = walls.iter().map(|w| w.seen(&truth, (0.0, 0.0), [1e-4, 1e-5])).collect();
+        tracker.seen(&seen, &reference, None);
+    }
+    assert_eq!(tracker.state(), Tracking::Lost(Lost::Contradicted));
+}
+
+#[test]
+fn a_bad_slip_is_believed_once_if_it_explains_more() {
+    let walls = [
+        Wall::new((9.0, 1.0), (0.0, 1.0)),
+        Wall::new((0.0, -1.0), (9.0, -1.0)),
+        Wall::new((9.0, -1.0), (9.0, 0.0)),
+        Wall::new((9.5, 0.0), (9.5, 1.0)),
+    ];
+    let reference = known(&walls);
+    let start = fix(Pose::new(2.0, 0.0, 0.0), [0.01, 0.01, 0.005]);
+    let mut tracker = Tracker::new(start, TrackerConfig::STANDARD);
+    let look = |tracker: &mut Tracker, x: f64| {
+        let truth = Pose::new(x, 0.0, 0.0);
+        let seen: Vec<_> = walls.iter().map(|w| w.seen(&truth, (0.0, 0.0), [1e-4, 1e-5])).collect();
+        tracker.seen(&seen, &reference, None)
+    };
+    // The wheels count half a metre and roll 30 cm.
+    tracker.moved(&Pose::new(0.5, 0.0, 0.0));
+    let report = look(&mut tracker, 2.3);
+    assert!(report.slipped && report.walls.len() == 4, "{report:?}");
+    assert!((tracked(&tracker).pose.x - 2.3).abs() < 0.01);
+    // Half a metre later that is no explanation any more.
+    tracker.moved(&Pose::new(0.5, 0.0, 0.0));
+    let report = look(&mut tracker, 2.6);
+    assert!(!report.slipped && report.refused == 2, "{report:?}");
+}
+
+#[test]
 fn who_sees_nothing_that_is_known_is_lost_after_five_metres() {
     let start = fix(Pose::identity(), [0.02, 0.02, 0.01]);
     let mut tracker = Tracker::new(start, TrackerConfig::STANDARD);

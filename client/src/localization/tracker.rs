@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use mapfold_map::geometry::{Level, Pose, Robot, UncertainPose, mahalanobis_sq};
+use mapfold_map::geometry::{Level, Pose, Robot, UncertainPose, mahalanobis_sq, unit_normal};
 use mapfold_map::landmarks::{FacesConfig, LandmarkTable, ObservedLandmark, landmarks_of_look};
 use mapfold_map::vector::ObservedSegment;
 use nalgebra::Vector3;
@@ -40,6 +40,12 @@ pub struct TrackerConfig {
     pub known_within: f64,
     /// What no sonar is better than: rough walls, and sound that takes its time to build up, metres.
     pub sonar_sd_min: f64,
+    /// What a bad slip of the wheels may do: deviations ahead and aside, metres, and of the heading, radians.
+    pub slip_sd: [f64; 3],
+    /// Two such slips are never nearer to each other than this, metres driven.
+    pub slips_apart: f64,
+    /// A slip is believed if a look explains so many more segments and landmarks with it.
+    pub slip_explains: usize,
     /// What makes landmarks of a look.
     pub faces: FacesConfig,
     /// When the robot is lost.
@@ -58,7 +64,10 @@ impl TrackerConfig {
         offset_max: 1.0,
         direction_sd_min: 3.0 * PI / 180.0,
         known_within: 1.0,
-        sonar_sd_min: 0.01,
+        sonar_sd_min: 0.02,
+        slip_sd: [0.15, 0.03, 0.03],
+        slips_apart: 5.0,
+        slip_explains: 2,
         faces: FacesConfig::STANDARD,
         watchdog: WatchdogConfig::STANDARD,
     };
@@ -71,6 +80,8 @@ pub struct TrackReport {
     pub walls: Vec<(usize, WallName)>,
     /// Landmarks of the look and what they were: number in the table.
     pub landmarks: Vec<(ObservedLandmark, u32)>,
+    /// Whether the wheels must have slipped badly before.
+    pub slipped: bool,
     /// How many segments, landmarks or echoes fitted nothing that is known there, or more than one thing.
     pub refused: usize,
     /// Normalised innovation squared of what was used, summed.
@@ -85,6 +96,10 @@ pub struct Tracker {
     config: TrackerConfig,
     filter: Filter,
     watchdog: Watchdog,
+    /// Whether it has, since the last look.
+    has_moved: bool,
+    /// How far, since the last bad slip, metres.
+    since_slip: f64,
 }
 
 /// Something that may have been seen, with its normalised innovation squared and cost (the negative logarithm of its
@@ -98,7 +113,13 @@ struct Choice<'a, W> {
 impl Tracker {
     /// From a fix on.
     pub fn new(fix: UncertainPose<Level, Robot>, config: TrackerConfig) -> Self {
-        Self { config, filter: Filter::new(fix), watchdog: Watchdog::default() }
+        Self {
+            config,
+            filter: Filter::new(fix),
+            watchdog: Watchdog::default(),
+            has_moved: false,
+            since_slip: f64::INFINITY,
+        }
     }
 
     /// Where the robot is, or why that is not known.
@@ -112,6 +133,11 @@ impl Tracker {
     /// The estimate, believed or not.
     pub fn pose(&self) -> &UncertainPose<Level, Robot> {
         self.filter.pose()
+    }
+
+    /// How many of the last looks in a row contradict the pose.
+    pub fn contradictions(&self) -> u32 {
+        self.watchdog.contradictions()
     }
 
     /// Whether a fix that was found without this pose agrees with it (99.9 %). If a fix does not, one of the two is
@@ -128,6 +154,8 @@ impl Tracker {
 
     /// The wheels have counted a step: the robot's pose now in its own frame before.
     pub fn moved(&mut self, step: &Pose<Robot, Robot>) {
+        self.has_moved = true;
+        self.since_slip += step.position().norm();
         self.filter.moved(&self.config.odometry.of_step(step));
         let covariance = &self.filter.pose().covariance;
         self.watchdog.moved(step.position().norm(), covariance, &self.config.watchdog);
@@ -141,6 +169,35 @@ impl Tracker {
         walls: &ReferenceWalls,
         table: Option<&LandmarkTable>,
     ) -> TrackReport {
+        let mut without = self.clone();
+        let (mut report, mut verdict) = without.held_against(segments, walls, table);
+        // Wheels rarely slip badly: that must explain what nothing else does.
+        let may_have_slipped = self.has_moved && self.since_slip > self.config.slips_apart;
+        if may_have_slipped && report.refused >= self.config.slip_explains {
+            let mut with = self.clone();
+            with.filter.slip(&with.config.slip_sd);
+            let (slipped, of_slipped) = with.held_against(segments, walls, table);
+            let used = |report: &TrackReport| report.walls.len() + report.landmarks.len();
+            let more = self.config.slip_explains;
+            if slipped.refused + more <= report.refused && used(&slipped) >= used(&report) + more {
+                without = with;
+                without.since_slip = 0.0;
+                (report, verdict) = (TrackReport { slipped: true, ..slipped }, of_slipped);
+            }
+        }
+        *self = without;
+        self.has_moved = false;
+        self.watchdog.looked(&verdict, &self.config.watchdog);
+        report
+    }
+
+    /// A look, taken in as it is.
+    fn held_against(
+        &mut self,
+        segments: &[ObservedSegment],
+        walls: &ReferenceWalls,
+        table: Option<&LandmarkTable>,
+    ) -> (TrackReport, Verdict) {
         let mut report = TrackReport::default();
         let mut verdict = Verdict::default();
         let mut used = Vec::new();
@@ -149,13 +206,13 @@ impl Tracker {
             let length = segment.to - segment.from;
             // The gate again: what came before has made the pose more certain.
             if let Some(off_sq) = self.line(wall, segment).and_then(|m| self.take(&m)) {
-                verdict.used += length;
+                verdict.use_wall(length, &wall.normal);
                 report.nis += off_sq;
                 report.freedom += 2;
                 report.walls.push((index, wall.name));
                 used.push(segment);
             } else {
-                verdict.refused += length;
+                verdict.refuse_wall(length, &wall.normal);
                 report.refused += 1;
             }
         }
@@ -163,8 +220,7 @@ impl Tracker {
             self.landmarks(segments, &used, walls, table, &mut report);
         }
         (verdict.off_sq, verdict.freedom) = (report.nis, report.freedom);
-        self.watchdog.looked(&verdict, &self.config.watchdog);
-        report
+        (report, verdict)
     }
 
     /// The robot has listened with its ring of sonars. Walls echo where they are met squarely, corners of the table
@@ -232,7 +288,8 @@ impl Tracker {
                 Told::Several => report.refused += 1,
                 Told::None if walls.near(&middle, &middle, config.known_within).is_empty() => {}
                 Told::None => {
-                    verdict.refused += segment.to - segment.from;
+                    let normal = unit_normal(segment.line.line.alpha() + pose.pose.heading());
+                    verdict.refuse_wall(segment.to - segment.from, &normal);
                     report.refused += 1;
                 }
             }

@@ -1,6 +1,9 @@
 //! When a tracked pose is no longer to be believed.
 
-use mapfold_map::geometry::{Covariance, Level, Robot, UncertainPose, chi_square_quantile};
+use mapfold_map::geometry::{
+    Covariance, Level, Point, Robot, UncertainPose, chi_square_quantile, unit_normal,
+};
+use nalgebra::Matrix2;
 
 /// What it takes to be lost.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -10,9 +13,10 @@ pub struct WatchdogConfig {
     /// What a look contradicts with: its innovations taken together beyond this quantile of chi-square, given
     /// as that of the standard normal distribution (99.9 %).
     pub quantile_sds: f64,
-    /// Or walls that fit nowhere although walls are known there: more of them than this share, by length.
+    /// Or walls that fit nowhere although walls are known there: more of them than this share, by length, of all
+    /// that tells where the robot is in some direction. The long sides of a corridor fit wherever along it the robot is.
     pub refused_share: f64,
-    /// Looks that show less wall than this prove nothing, metres.
+    /// Less wall than this proves nothing, metres.
     pub wall_min: f64,
     /// Metres driven without anything that fits.
     pub blind_max: f64,
@@ -61,9 +65,33 @@ pub(super) struct Verdict {
     /// Sum of the squared innovations of what was used, and their degrees of freedom.
     pub(super) off_sq: f64,
     pub(super) freedom: usize,
-    /// How much of what was seen was used, and refused, in metres of wall.
-    pub(super) used: f64,
-    pub(super) refused: f64,
+    /// How much of what was seen was used, and refused: `sum length n n^T` over walls with the normals `n`, metres.
+    used: Matrix2<f64>,
+    refused: Matrix2<f64>,
+}
+
+/// Directions in which walls are weighed, in half a turn.
+const DIRECTIONS: u32 = 12;
+
+impl Verdict {
+    /// A wall of some length was used.
+    pub(super) fn use_wall(&mut self, length: f64, normal: &Point) {
+        self.used += normal * normal.transpose() * length;
+    }
+
+    /// A wall of some length was refused.
+    pub(super) fn refuse_wall(&mut self, length: f64, normal: &Point) {
+        self.refused += normal * normal.transpose() * length;
+    }
+
+    /// Whether more than a share of what tells the place in some direction was refused.
+    fn refuses(&self, config: &WatchdogConfig) -> bool {
+        (0..DIRECTIONS).any(|i| {
+            let d = unit_normal(f64::from(i) * std::f64::consts::PI / f64::from(DIRECTIONS));
+            let [used, refused] = [&self.used, &self.refused].map(|of| (d.transpose() * of * d).x);
+            refused >= config.wall_min && refused > config.refused_share * (used + refused)
+        })
+    }
 }
 
 /// Counts what speaks against the pose.
@@ -75,6 +103,11 @@ pub(super) struct Watchdog {
 }
 
 impl Watchdog {
+    /// Looks in a row that have contradicted the pose so far.
+    pub(super) fn contradictions(&self) -> u32 {
+        self.contradictions
+    }
+
     pub(super) fn lost(&self) -> Option<Lost> {
         self.lost
     }
@@ -94,17 +127,14 @@ impl Watchdog {
 
     /// The robot has looked.
     pub(super) fn looked(&mut self, verdict: &Verdict, config: &WatchdogConfig) {
-        let Verdict { off_sq, freedom, used, refused } = *verdict;
+        let Verdict { off_sq, freedom, .. } = *verdict;
         if freedom > 0 {
             self.blind = 0.0;
         }
-        if used + refused < config.wall_min {
-            return;
-        }
         let is_off = freedom > 0 && off_sq > chi_square_quantile(freedom, config.quantile_sds);
-        if is_off || refused > config.refused_share * (used + refused) {
+        if is_off || verdict.refuses(config) {
             self.contradictions += 1;
-        } else {
+        } else if freedom > 0 {
             self.contradictions = 0;
         }
         if self.contradictions >= config.contradictions {
