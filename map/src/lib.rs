@@ -64,6 +64,7 @@
 //! * [`raster`]: integer log-odds evidence and the tiles it adds up in.
 //! * [`gdb`]: the building as it was meant to be, cut to what a sensor would see of it.
 //! * [`changes`]: what a level's map says against a plan of the GDB.
+//! * [`places`]: where on a map a whole look fits, and nowhere else.
 //! * [`level`]: contributions, the fold, and patches between two revisions.
 
 #[cfg(test)]
@@ -73,5 +74,6 @@ pub mod gdb;
 pub mod geometry;
 pub mod landmarks;
 pub mod level;
+pub mod places;
 pub mod raster;
 pub mod vector;

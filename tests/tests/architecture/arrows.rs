@@ -71,6 +71,7 @@ const MODULES: &[(&str, &[ModuleRule])] = &[
             ),
             ("level", &["geometry", "raster", "vector"]),
             ("changes", &["gdb", "geometry", "level", "raster", "vector"]),
+            ("places", &["geometry", "level", "raster", "vector"]),
         ],
     ),
     (
@@ -100,9 +101,24 @@ const MODULES: &[(&str, &[ModuleRule])] = &[
             ("geojson", &["perception"]),
             ("robot", &["emulation", "evidence", "log", "perception", "sensor"]),
             // Of emulation its chance only, for unit tests.
-            ("localization", &["emulation::Chance", "robot::OdometryNoise", "sensor"]),
+            (
+                "localization",
+                &["emulation::Chance", "perception", "robot::OdometryNoise", "sensor"],
+            ),
             ("replay", &["log", "robot", "sensor", "sync"]),
-            ("cli", &["geojson", "log", "perception", "replay", "robot", "sensor", "sync"]),
+            (
+                "cli",
+                &[
+                    "geojson",
+                    "localization",
+                    "log",
+                    "perception",
+                    "replay",
+                    "robot",
+                    "sensor",
+                    "sync",
+                ],
+            ),
         ],
     ),
     (

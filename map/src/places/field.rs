@@ -1,0 +1,277 @@
+//! The likelihood field: how well a beam that ends in a cell fits the map.
+
+use super::PlacesConfig;
+use super::headings::Directions;
+use super::pyramid::Pyramid;
+use crate::geometry::Point;
+use crate::level::LevelMap;
+use crate::raster::{
+    Layered, LogOdds, SensorClass, TILE_CELLS, TILE_SIDE, Tile, TileIndex, TileKey,
+};
+use crate::vector::Facing;
+
+/// Steps of a nat in which fits are counted.
+pub(super) const STEPS: f64 = 20.0;
+/// Most cells of the search: beyond, they are made larger.
+const CELLS_MAX: usize = 32_000_000;
+
+/// What is known of a cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Known {
+    Nothing,
+    Free,
+    Occupied,
+}
+
+/// A level's raster as a search reads it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LikelihoodField {
+    pub(super) config: PlacesConfig,
+    /// Edge of the map's cells, metres.
+    resolution: f64,
+    /// Tiles from the lower left one on: which of those kept each is, from 1; 0 for none.
+    low: TileIndex,
+    columns: usize,
+    slots: Vec<u32>,
+    /// Fits of the cells of the tiles that are kept, in steps above the worst.
+    fits: Vec<u8>,
+    known: Vec<Known>,
+    /// The best fit.
+    pub(super) best: u8,
+    pub(super) search: SearchField,
+}
+
+/// The field at the cells of the search, which forgives what is off by less than one of them.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct SearchField {
+    /// Edge of a cell, metres.
+    pub(super) cell: f64,
+    /// Lower left corner of cell (0, 0), metres.
+    pub(super) corner: Point,
+    /// Columns and rows.
+    pub(super) size: (usize, usize),
+    /// Bounds of fits.
+    pub(super) fits: Pyramid,
+    /// Whether a robot can stand anywhere in a block.
+    pub(super) free: Pyramid,
+    /// Cells where a robot can stand.
+    pub(super) free_count: usize,
+    pub(super) directions: Directions,
+}
+
+impl LikelihoodField {
+    /// Of a map: what its layers come to together, and its walls. `resolution` is the edge of its cells.
+    pub fn of_map(map: &LevelMap, resolution: f64, config: &PlacesConfig) -> Self {
+        let mut places: Vec<TileIndex> = map.tiles.keys().map(|key| key.tile).collect();
+        places.extend(map.prior.keys());
+        places.sort_unstable();
+        places.dedup();
+        let layer = |class, tile| map.tiles.get(&TileKey { class, tile }).map(AsRef::as_ref);
+        let together = |tile: TileIndex| {
+            Layered {
+                prior: map.prior.get(&tile).map(AsRef::as_ref),
+                scanner: layer(SensorClass::Scanner, tile),
+                sonar: layer(SensorClass::Sonar, tile),
+                walls: None,
+            }
+            .together()
+        };
+        let tiles = places.into_iter().filter_map(|tile| Some((tile, together(tile)?)));
+        let walls = map.segments.values().flat_map(|segment| {
+            segment.solid.iter().map(|part| {
+                let ends = (segment.line.at(part.span.from_m()), segment.line.at(part.span.to_m()));
+                match segment.facing {
+                    Facing::Origin => ends,
+                    Facing::Away => (ends.1, ends.0),
+                }
+            })
+        });
+        Self::new(tiles, walls, resolution, config)
+    }
+
+    /// Of tiles with what is known of their cells, and of walls with free space on the left.
+    pub fn new(
+        tiles: impl IntoIterator<Item = (TileIndex, Tile)>,
+        walls: impl IntoIterator<Item = (Point, Point)>,
+        resolution: f64,
+        config: &PlacesConfig,
+    ) -> Self {
+        let tiles: Vec<(TileIndex, Tile)> = tiles.into_iter().collect();
+        let directions = Directions::new(walls);
+        let span = |of: fn(&TileIndex) -> i32| {
+            let low = tiles.iter().map(|t| of(&t.0)).min().unwrap_or(0);
+            let high = tiles.iter().map(|t| of(&t.0)).max().unwrap_or(-1);
+            (low, (i64::from(high) - i64::from(low) + 1) as usize)
+        };
+        let ((x, columns), (y, rows)) = (span(|t| t.x), span(|t| t.y));
+        let low = TileIndex { x, y };
+        let mut slots = vec![0; columns * rows];
+        let mut known = Vec::with_capacity(tiles.len() * TILE_CELLS);
+        for (number, (index, tile)) in (1..).zip(&tiles) {
+            slots[(index.y - y) as usize * columns + (index.x - x) as usize] = number;
+            known.extend(tile.cells().iter().map(|cell| of_evidence(LogOdds(*cell), config)));
+        }
+        let best = (STEPS * config.free_cost.max(config.unknown_cost)).round() as u8;
+        let fits = known.iter().map(|known| fit(*known, best, config)).collect();
+        let mut field = Self {
+            config: *config,
+            resolution,
+            low,
+            columns,
+            slots,
+            fits,
+            known,
+            best,
+            search: SearchField {
+                cell: config.cell,
+                corner: Point::zeros(),
+                size: (0, 0),
+                fits: Pyramid::default(),
+                free: Pyramid::default(),
+                free_count: 0,
+                directions,
+            },
+        };
+        field.soften();
+        field.search_field((columns, rows));
+        field
+    }
+
+    /// Cells near occupied ones fit by their distance.
+    fn soften(&mut self) {
+        let reach = (2.5 * self.config.spread / self.resolution).ceil() as i64;
+        let kernel: Vec<(i64, i64, u8)> = (-reach..=reach)
+            .flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy)))
+            .map(|(dx, dy)| {
+                let off = ((dx * dx + dy * dy) as f64).sqrt() * self.resolution;
+                let cost = STEPS * 0.5 * (off / self.config.spread).powi(2);
+                (dx, dy, (f64::from(self.best) - cost).max(0.0).round() as u8)
+            })
+            .collect();
+        let side = TILE_SIDE as i64;
+        let rows = self.slots.len() / self.columns.max(1);
+        for tile in 0..self.slots.len() {
+            let Some(slot) = self.slots[tile].checked_sub(1) else { continue };
+            let corner = ((tile % self.columns) as i64 * side, (tile / self.columns) as i64 * side);
+            for offset in 0..TILE_CELLS {
+                if self.known[slot as usize * TILE_CELLS + offset] != Known::Occupied {
+                    continue;
+                }
+                let x = corner.0 + (offset % TILE_SIDE) as i64;
+                let y = corner.1 + (offset / TILE_SIDE) as i64;
+                for (dx, dy, fit) in &kernel {
+                    let (x, y) = (x + dx, y + dy);
+                    if x < 0 || y < 0 || y >= rows as i64 * side {
+                        continue;
+                    }
+                    if let Some(at) = self.index(x, y) {
+                        self.fits[at] = self.fits[at].max(*fit);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Where a cell, counted from the lower left tile, is kept.
+    fn index(&self, x: i64, y: i64) -> Option<usize> {
+        let side = TILE_SIDE as i64;
+        if x < 0 || y < 0 || x >= self.columns as i64 * side {
+            return None;
+        }
+        let tile = (y / side) as usize * self.columns + (x / side) as usize;
+        let slot = self.slots.get(tile)?.checked_sub(1)?;
+        Some(slot as usize * TILE_CELLS + (y % side * side + x % side) as usize)
+    }
+
+    fn index_of(&self, p: &Point) -> Option<usize> {
+        let side = TILE_SIDE as i64;
+        let x = (p.x / self.resolution).floor() as i64 - i64::from(self.low.x) * side;
+        let y = (p.y / self.resolution).floor() as i64 - i64::from(self.low.y) * side;
+        self.index(x, y)
+    }
+
+    /// How well a beam that ends there fits, in steps above the worst.
+    pub(super) fn fit(&self, p: &Point) -> u8 {
+        let unknown = || fit(Known::Nothing, self.best, &self.config);
+        self.index_of(p).map_or_else(unknown, |at| self.fits[at])
+    }
+
+    /// What is known of a place.
+    pub(super) fn known(&self, p: &Point) -> Known {
+        self.index_of(p).map_or(Known::Nothing, |at| self.known[at])
+    }
+
+    fn search_field(&mut self, (columns, rows): (usize, usize)) {
+        let (wide, high) = (columns * TILE_SIDE, rows * TILE_SIDE);
+        let mut factor = ((self.config.cell / self.resolution).round() as usize).max(1);
+        while (wide / factor) * (high / factor) > CELLS_MAX {
+            factor *= 2;
+        }
+        let (width, height) = (wide.div_ceil(factor), high.div_ceil(factor));
+        let mut counts = vec![(0_u32, 0_u32); width * height];
+        for (tile, slot) in self.slots.iter().enumerate() {
+            let Some(slot) = slot.checked_sub(1) else { continue };
+            let (x, y) = (tile % columns * TILE_SIDE, tile / columns * TILE_SIDE);
+            let cells = &self.known[slot as usize * TILE_CELLS..][..TILE_CELLS];
+            for (offset, known) in cells.iter().enumerate() {
+                let (x, y) = (x + offset % TILE_SIDE, y + offset / TILE_SIDE);
+                let count = &mut counts[y / factor * width + x / factor];
+                count.0 += u32::from(*known == Known::Occupied);
+                count.1 += u32::from(*known == Known::Free);
+            }
+        }
+        let of_cell = |(occupied, free): &(u32, u32)| match (occupied, free) {
+            (1.., _) => Known::Occupied,
+            (0, free) if 2 * *free as usize >= factor * factor => Known::Free,
+            _ => Known::Nothing,
+        };
+        let known: Vec<Known> = counts.iter().map(of_cell).collect();
+        let mut fits: Vec<u8> =
+            known.iter().map(|known| fit(*known, self.best, &self.config)).collect();
+        for (at, _) in known.iter().enumerate().filter(|(_, k)| **k == Known::Occupied) {
+            let (x, y) = (at % width, at / width);
+            for y in y.saturating_sub(1)..(y + 2).min(height) {
+                fits[y * width + x.saturating_sub(1)..y * width + (x + 2).min(width)]
+                    .fill(self.best);
+            }
+        }
+        let free: Vec<u8> = known.iter().map(|known| u8::from(*known == Known::Free)).collect();
+        let search = &mut self.search;
+        search.cell = self.resolution * factor as f64;
+        search.size = (width, height);
+        let corner = |tile: i32| f64::from(tile) * TILE_SIDE as f64 * self.resolution;
+        search.corner = Point::new(corner(self.low.x), corner(self.low.y));
+        let reach = (self.config.search_range / search.cell).ceil() as usize + 1;
+        let outside = fit(Known::Nothing, self.best, &self.config);
+        search.free_count = free.iter().map(|free| usize::from(*free)).sum();
+        search.fits = Pyramid::new(&fits, search.size, outside, reach);
+        search.free = Pyramid::new(&free, search.size, 0, 0);
+    }
+
+    /// Logarithm of the number of places that can be told apart.
+    pub fn ln_places(&self) -> f64 {
+        let (apart, turned) = self.config.apart;
+        let area = self.search.free_count as f64 * self.search.cell * self.search.cell;
+        (area / (apart * apart) * std::f64::consts::TAU / turned).max(1.0).ln()
+    }
+}
+
+fn of_evidence(evidence: LogOdds, config: &PlacesConfig) -> Known {
+    let nat = evidence.nat();
+    if nat >= config.occupied {
+        Known::Occupied
+    } else if nat <= config.free {
+        Known::Free
+    } else {
+        Known::Nothing
+    }
+}
+
+fn fit(known: Known, best: u8, config: &PlacesConfig) -> u8 {
+    let cost = match known {
+        Known::Occupied => 0.0,
+        Known::Nothing => config.unknown_cost,
+        Known::Free => config.free_cost,
+    };
+    (f64::from(best) - STEPS * cost).max(0.0).round() as u8
+}

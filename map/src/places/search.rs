@@ -1,0 +1,262 @@
+//! All places that a look fits nearly as well as the best, by branch and bound.
+//!
+//! Blocks of places, heading by heading, are looked into in the order of what their best place can come to
+//! at most; a block that cannot come near the best place found so far is never opened. A block of one
+//! place is moved to where it fits best and weighed in full. The bound holds for what the ends of the beams come to
+//! on cells of the search, which forgive what is off by less than one of them.
+
+use std::collections::BinaryHeap;
+
+use super::field::{LikelihoodField, STEPS};
+use super::pyramid::LEVELS;
+use super::weigh::{refined, weighed};
+use super::{Beam, Found, Place, View};
+use crate::geometry::{Level, Point, Pose, Robot, difference};
+
+/// Poses so close to one that was tried would be moved to the same place: metres, radians.
+const TRIED: (f64, f64) = (0.25, 0.03);
+/// Headings within this of a place that is kept belong to it, radians.
+const SAME_HEADING: f64 = 0.15;
+/// Beams between two looks at whether a block can still come to anything.
+const CHUNK: usize = 16;
+
+/// A block of places at one heading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Block {
+    /// What its best place comes to at most, in steps.
+    bound: u32,
+    level: u8,
+    heading: u16,
+    x: i32,
+    y: i32,
+}
+
+/// The ends of beams at one heading, as offsets into each level of the field.
+type Turned = Vec<Vec<i64>>;
+
+/// The place close to a pose at which a look fits best.
+pub fn place_near(field: &LikelihoodField, view: &View, pose: &Pose<Level, Robot>) -> Place {
+    let beams = thinned(&view.beams, field.config.beams_max);
+    weighed(field, &beams, &refined(field, &beams, *pose))
+}
+
+/// Finds where the look that `view` is can have been taken: all places, if there are not too many, that
+/// fit it as well as the best to within the odds and the margin, and better than one of so many must by chance. `proposals` are poses to begin with, from landmarks that
+/// were matched for instance; the answer does not depend on them, only the time that it takes.
+pub fn search(field: &LikelihoodField, view: &View, proposals: &[Pose<Level, Robot>]) -> Found {
+    let config = &field.config;
+    let beams = thinned(&view.beams, config.beams_max);
+    let is_near = |beam: &&Beam| beam.to.norm() <= config.search_range;
+    let near: Vec<Beam> = beams.iter().filter(is_near).copied().collect();
+    if near.is_empty() {
+        let rest = config.temper * config.elsewhere * beams.len() as f64;
+        return Found { places: Vec::new(), rest, blocks: 0 };
+    }
+    let headings = field.search.directions.headings(&view.walls);
+    let turned = headings.iter().map(|heading| turned(field, &near, *heading)).collect();
+    let mut search = Search {
+        field,
+        beams: &beams,
+        near: near.len(),
+        headings,
+        turned,
+        least: 1,
+        best: f64::NEG_INFINITY,
+        places: Vec::new(),
+        tried: Vec::new(),
+    };
+    // What is no likelier than a place elsewhere is of no interest: among so many, one fits by chance.
+    search.raise(field.ln_places());
+    for proposal in proposals {
+        search.weigh(*proposal);
+    }
+    let (rest, blocks) = search.run();
+    let mut places = search.places;
+    places.retain(|place| place.fit >= search.best - config.odds - config.margin);
+    places.sort_by(|a, b| b.fit.total_cmp(&a.fit));
+    Found { places, rest, blocks }
+}
+
+/// Evenly taken from all.
+fn thinned(beams: &[Beam], most: usize) -> Vec<Beam> {
+    if beams.len() <= most {
+        return beams.to_vec();
+    }
+    (0..most).map(|i| beams[i * beams.len() / most]).collect()
+}
+
+fn turned(field: &LikelihoodField, beams: &[Beam], heading: f64) -> Turned {
+    let (sin, cos) = heading.sin_cos();
+    let cell = field.search.cell;
+    let ends: Vec<(i32, i32)> = beams
+        .iter()
+        .map(|Beam { to, .. }| {
+            let (x, y) = (cos * to.x - sin * to.y, sin * to.x + cos * to.y);
+            ((x / cell).round() as i32, (y / cell).round() as i32)
+        })
+        .collect();
+    let of_level =
+        |level| ends.iter().map(|(x, y)| field.search.fits.offset(level, *x, *y)).collect();
+    (0..LEVELS).map(of_level).collect()
+}
+
+struct Search<'a> {
+    field: &'a LikelihoodField,
+    beams: &'a [Beam],
+    /// Beams that are searched with.
+    near: usize,
+    headings: Vec<f64>,
+    turned: Vec<Turned>,
+    /// What a block must come to, in steps.
+    least: u32,
+    /// How well the best place so far fits.
+    best: f64,
+    places: Vec<Place>,
+    tried: Vec<Pose<Level, Robot>>,
+}
+
+impl Search<'_> {
+    /// Looks into blocks until none can hold a place that matters; answers what no other place exceeds, and how
+    /// many blocks there were.
+    fn run(&mut self) -> (f64, usize) {
+        let config = &self.field.config;
+        let mut blocks = self.coarsest();
+        let mut opened = 0;
+        while let Some(block) = blocks.pop() {
+            if block.bound < self.least {
+                break;
+            }
+            opened += 1;
+            if opened > config.blocks_max
+                || self.tried.len() >= config.tries_max
+                || self.places.len() >= config.places_max
+            {
+                return (self.fit_of(block.bound), opened);
+            }
+            if self.is_known(&block) {
+                continue;
+            }
+            let Some(level) = block.level.checked_sub(1) else {
+                self.weigh(self.pose(&block));
+                continue;
+            };
+            let half = 1 << level;
+            for (dx, dy) in [(0, 0), (half, 0), (0, half), (half, half)] {
+                let (x, y) = (block.x + dx, block.y + dy);
+                let bound = self.bound(level, block.heading, x, y).min(block.bound);
+                if bound >= self.least {
+                    blocks.push(Block { bound, level, x, y, ..block });
+                }
+            }
+        }
+        (self.fit_of(self.least), opened)
+    }
+
+    fn coarsest(&self) -> BinaryHeap<Block> {
+        let level = LEVELS as u8 - 1;
+        let (width, height) = self.field.search.size;
+        let mut blocks = Vec::new();
+        for heading in 0..self.headings.len() as u16 {
+            for y in (0..height as i32).step_by(1 << level) {
+                for x in (0..width as i32).step_by(1 << level) {
+                    let bound = self.bound(level, heading, x, y);
+                    if bound >= self.least {
+                        blocks.push(Block { bound, level, heading, x, y });
+                    }
+                }
+            }
+        }
+        BinaryHeap::from(blocks)
+    }
+
+    /// What the best place of a block comes to at most; 0 if it is less than what matters.
+    fn bound(&self, level: u8, heading: u16, x: i32, y: i32) -> u32 {
+        let (level, field) = (usize::from(level), &self.field.search);
+        if field.free.value(level, field.free.place(level, x, y)) == 0 {
+            return 0;
+        }
+        let place = field.fits.place(level, x, y);
+        let offsets = &self.turned[usize::from(heading)][level];
+        let (mut sum, mut left) = (0, offsets.len());
+        for chunk in offsets.chunks(CHUNK) {
+            sum += chunk.iter().map(|o| u32::from(field.fits.value(level, place + o))).sum::<u32>();
+            left -= chunk.len();
+            if sum + left as u32 * u32::from(self.field.best) < self.least {
+                return 0;
+            }
+        }
+        sum
+    }
+
+    /// The pose of a block of one place.
+    fn pose(&self, block: &Block) -> Pose<Level, Robot> {
+        let at = self.lower(block);
+        Pose::new(at.x, at.y, self.headings[usize::from(block.heading)])
+    }
+
+    /// The first place of a block.
+    fn lower(&self, block: &Block) -> Point {
+        let field = &self.field.search;
+        let half = Point::new(f64::from(block.x) + 0.5, f64::from(block.y) + 0.5);
+        field.corner + half * field.cell
+    }
+
+    /// Whether all places of a block are close to one that is kept or was tried.
+    fn is_known(&self, block: &Block) -> bool {
+        let lower = self.lower(block);
+        let heading = self.headings[usize::from(block.heading)];
+        let side = f64::from((1_u32 << block.level) - 1) * self.field.search.cell;
+        let is_within = |pose: &Pose<Level, Robot>, (reach, turn): (f64, f64)| {
+            let off = |at: f64, lower: f64| (at - lower).abs().max((at - lower - side).abs());
+            difference(pose.heading(), heading).abs() < turn
+                && off(pose.x, lower.x).hypot(off(pose.y, lower.y)) < reach
+        };
+        let same = (0.8 * self.field.config.apart.0, SAME_HEADING);
+        self.places.iter().any(|place| is_within(&place.level_from_robot.pose, same))
+            || (side < TRIED.0 && self.tried.iter().any(|pose| is_within(pose, TRIED)))
+    }
+
+    /// Moves a pose to where it fits best and keeps it if it fits nearly as well as the best.
+    fn weigh(&mut self, pose: Pose<Level, Robot>) {
+        self.tried.push(pose);
+        let place = weighed(self.field, self.beams, &refined(self.field, self.beams, pose));
+        let config = &self.field.config;
+        if place.fit < self.field.ln_places() || place.fit < self.best - config.odds - config.margin
+        {
+            return;
+        }
+        if place.fit > self.best {
+            self.best = place.fit;
+            self.raise(self.best - config.odds - config.margin);
+        }
+        let (apart, turned) = config.apart;
+        let at = place.level_from_robot.pose;
+        let is_same = |other: &&mut Place| {
+            let other = &other.level_from_robot.pose;
+            (other.position() - at.position()).norm() < apart
+                && difference(other.heading(), at.heading()).abs() < turned
+        };
+        match self.places.iter_mut().find(is_same) {
+            Some(known) if known.fit < place.fit => *known = place,
+            Some(_) => {}
+            None => self.places.push(place),
+        }
+    }
+
+    /// How well a place fits at most whose near beams' ends come to `steps`.
+    fn fit_of(&self, steps: u32) -> f64 {
+        let config = &self.field.config;
+        let most = f64::from(self.field.best) * self.near as f64;
+        let cost = (most - f64::from(steps)) / STEPS;
+        config.temper * (config.elsewhere * self.beams.len() as f64 - cost)
+    }
+
+    /// From now on only places matter that fit as well as this. Beams that are not searched with can only
+    /// cost.
+    fn raise(&mut self, fit: f64) {
+        let config = &self.field.config;
+        let cost = config.elsewhere * self.beams.len() as f64 - fit / config.temper;
+        let most = f64::from(self.field.best) * self.near as f64;
+        self.least = self.least.max((most - STEPS * cost).max(0.0) as u32);
+    }
+}

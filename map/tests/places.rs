@@ -1,0 +1,138 @@
+//! Places on small made-up levels: found, told apart, and not invented.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+use std::collections::BTreeMap;
+
+use mapfold_map::geometry::{Level, Point, Pose, Robot, difference};
+use mapfold_map::places::{Beam, LikelihoodField, PlacesConfig, View, search};
+use mapfold_map::raster::{Cell, TILE_CELLS, Tile, TileIndex};
+
+const RESOLUTION: f64 = 0.05;
+
+/// Rectangles that are free inside, `[left, bottom, right, top]`, with walls where no other one goes on.
+type Floor = Vec<[f64; 4]>;
+
+fn is_free(floor: &Floor, p: &Point) -> bool {
+    floor.iter().any(|[left, bottom, right, top]| {
+        (*left..*right).contains(&p.x) && (*bottom..*top).contains(&p.y)
+    })
+}
+
+/// An L with a niche, unlike itself when turned.
+fn angled(x: f64) -> Floor {
+    vec![[x, 0.0, x + 7.0, 3.0], [x, 0.0, x + 2.5, 6.0], [x + 4.0, 3.0, x + 5.0, 3.6]]
+}
+
+/// The field of what a robot would have drawn of the floors that are on its map.
+fn field(floor: &Floor) -> LikelihoodField {
+    let mut tiles: BTreeMap<TileIndex, Box<[i32; TILE_CELLS]>> = BTreeMap::new();
+    let around = |v: f64, by: i32| (v / RESOLUTION).round() as i32 + by;
+    for [left, bottom, right, top] in floor {
+        for column in around(*left, -2)..around(*right, 2) {
+            for row in around(*bottom, -2)..around(*top, 2) {
+                let cell = Cell { column, row };
+                let centre = cell.centre(RESOLUTION);
+                let near = [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)]
+                    .map(|(x, y)| is_free(floor, &(centre + Point::new(x, y) * RESOLUTION)));
+                let value = match (is_free(floor, &centre), near.contains(&true)) {
+                    (true, _) => -300,
+                    (false, true) => 300,
+                    (false, false) => continue,
+                };
+                let (tile, offset) = cell.tile();
+                tiles.entry(tile).or_insert_with(|| Box::new([0; TILE_CELLS]))[offset] = value;
+            }
+        }
+    }
+    let walls = floor.iter().flat_map(|[left, bottom, right, top]| {
+        let corners = [(*left, *bottom), (*right, *bottom), (*right, *top), (*left, *top)];
+        let corners = corners.map(|(x, y)| Point::new(x, y));
+        (0..4).map(move |i| (corners[i], corners[(i + 1) % 4]))
+    });
+    let tiles = tiles.into_iter().map(|(index, cells)| (index, Tile::new(cells)));
+    LikelihoodField::new(tiles, walls, RESOLUTION, &PlacesConfig::STANDARD)
+}
+
+/// What a robot sees all around, by stepping along its beams.
+fn view(floor: &Floor, level_from_robot: &Pose<Level, Robot>) -> View {
+    let mut view = View::default();
+    let robot_from_level = level_from_robot.inverse();
+    for degrees in 0..360 {
+        let (sin, cos) = f64::from(degrees).to_radians().sin_cos();
+        let steps = (1..1500).map(|i| f64::from(i) * 0.01);
+        let mut ends = steps.map(|t| Point::new(cos * t, sin * t));
+        let to = ends.find(|p| !is_free(floor, &level_from_robot.act(p))).unwrap();
+        view.add(Beam { from: Point::zeros(), to, normal: None }, &PlacesConfig::STANDARD);
+    }
+    let sides =
+        [(0.0, 0.0, 1.0, 0.0), (0.0, 1.0, 0.0, 0.0), (1.0, 0.0, 1.0, 1.0), (1.0, 1.0, 0.0, 1.0)];
+    // Directions of all sides, with free space on the left: what perception would tell of them.
+    view.walls = sides
+        .map(|(ax, ay, bx, by)| {
+            let act = |x: f64, y: f64| robot_from_level.act(&Point::new(2.0 * x, 2.0 * y));
+            (act(ax, ay), act(bx, by))
+        })
+        .to_vec();
+    view
+}
+
+fn is_at(found: &Pose<Level, Robot>, truth: &Pose<Level, Robot>) -> bool {
+    (found.position() - truth.position()).norm() < 0.06
+        && difference(found.heading(), truth.heading()).abs() < 0.02
+}
+
+#[test]
+fn a_room_unlike_any_other_is_found_from_anywhere_in_it() {
+    let floor = angled(3.0);
+    let field = field(&floor);
+    for (x, y, heading) in [(4.0, 1.0, 0.3), (4.2, 5.1, -2.0), (9.0, 2.2, 3.1), (7.4, 0.6, 1.6)] {
+        let truth = Pose::new(x, y, heading);
+        let found = search(&field, &view(&floor, &truth), &[]);
+        let best = found.places.first().unwrap();
+        assert!(is_at(&best.level_from_robot.pose, &truth), "{truth:?}: {best:?}");
+        assert_eq!(found.places.len(), 1, "{truth:?}");
+        assert!(found.rest < best.fit - 6.9, "{truth:?}: {found:?}");
+        assert!(best.hits > 0.95 && best.throughs < 0.05, "{best:?}");
+    }
+}
+
+#[test]
+fn of_two_equal_rooms_both_are_told_and_proposals_change_nothing() {
+    let floor = [angled(0.0), angled(20.0)].concat();
+    let field = field(&floor);
+    let truth = Pose::new(1.2, 4.0, 0.7);
+    let twin = Pose::new(21.2, 4.0, 0.7);
+    let view = view(&floor, &truth);
+    let found = search(&field, &view, &[]);
+    for pose in [truth, twin] {
+        assert!(found.places.iter().any(|p| is_at(&p.level_from_robot.pose, &pose)), "{found:?}");
+    }
+    assert!((found.places[0].fit - found.places[1].fit).abs() < 1.0, "{found:?}");
+    let wrong = Pose::new(3.0, 1.0, 2.0);
+    let helped = search(&field, &view, &[twin, wrong]);
+    assert_eq!(helped.places.len(), found.places.len());
+}
+
+#[test]
+fn a_place_that_is_not_on_the_map_fits_nowhere() {
+    let field = field(&angled(0.0));
+    // A round hall that no corner of an L resembles.
+    let hall: Floor = (0..60)
+        .map(|i| {
+            let x = -4.0 + 8.0 * (f64::from(i) + 0.5) / 60.0;
+            let y = (16.0 - x * x).sqrt();
+            [x - 0.08, -y, x + 0.08, y]
+        })
+        .collect();
+    let found = search(&field, &view(&hall, &Pose::new(0.5, 0.4, 0.2)), &[]);
+    assert!(found.places.is_empty(), "{found:?}");
+}
+
+#[test]
+fn nothing_seen_and_nothing_known_are_no_place() {
+    let field = field(&angled(0.0));
+    assert!(search(&field, &View::default(), &[]).places.is_empty());
+    let nothing = LikelihoodField::new([], [], RESOLUTION, &PlacesConfig::STANDARD);
+    let view = view(&angled(0.0), &Pose::new(1.0, 1.0, 0.0));
+    assert!(search(&nothing, &view, &[]).places.is_empty());
+}
