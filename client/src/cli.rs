@@ -6,6 +6,7 @@
 
 mod calibrate;
 mod extract;
+mod locate;
 mod mirror;
 mod progress;
 mod replay;
@@ -35,6 +36,8 @@ enum Command {
     Replay(Box<replay::Replay>),
     /// Extract walls and clusters from a log's scans into a GeoJSON file; needs no server.
     Extract(extract::Extract),
+    /// Find where each scan of a log was taken on a level, one line of JSON each.
+    Locate(locate::Locate),
     /// Keep a local copy of a level up to date.
     Mirror(mirror::MirrorLevel),
     /// Make a scanner's profile, with a table that corrects its ranges, from readings of a flat
@@ -61,6 +64,7 @@ async fn dispatch(command: Command, rng: StdRng) -> Result<ExitCode, Box<dyn std
     match command {
         Command::Replay(replay) => replay.run(rng).await,
         Command::Extract(extract) => extract.run(),
+        Command::Locate(locate) => locate.run().await,
         Command::Mirror(mirror) => mirror.run(rng).await,
         Command::Calibrate(calibrate) => calibrate.run(),
     }

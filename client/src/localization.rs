@@ -1,4 +1,9 @@
-//! Where the robot is while it drives: its pose carried on by the wheels and held against walls and landmarks
+//! Where the robot is: found from nothing, kept while it drives, and said to be lost when it is.
+//!
+//! [`Localizer`] is the whole of it: a [`Seeker`] holds whole looks against the raster until one place is certain
+//! (`mapfold_map::places`), a [`Tracker`] goes on from there until it is not.
+//!
+//! The tracker: its pose carried on by the wheels and held against walls and landmarks
 //! that are known, those of the shared map or of the plan of the a-priori model.
 //!
 //! [`ReferenceWalls`] are what looks are held against, found by place. [`Tracker`] is an extended Kalman filter on
@@ -25,19 +30,25 @@
 //! }
 //! ```
 //!
-//! Knows no scans, no server and no grid.
+//! Knows no server.
 
 mod filter;
 mod landmarks;
 mod lines;
+mod localizer;
 mod reference_walls;
+mod seeker;
 mod sonar;
 #[cfg(test)]
 mod tests;
 mod tracker;
+mod view;
 mod watchdog;
 
 pub use filter::WallName;
+pub use localizer::{KnownLevel, Localized, Localizer, LocalizerConfig};
 pub use reference_walls::{ReferenceWalls, ReferenceWallsConfig};
+pub use seeker::{Candidate, Fix, Seeker, SeekerConfig};
 pub use tracker::{TrackReport, Tracker, TrackerConfig};
+pub use view::view;
 pub use watchdog::{Lost, Tracking, WatchdogConfig};
