@@ -24,6 +24,7 @@
 //! * [`buildings`]: what comes of real buildings that are taken in as models.
 //! * [`plans`]: what vast models cost.
 //! * [`serving`]: how long a server takes to answer about small and vast rasters.
+//! * [`places`]: whether a robot that knows nothing finds its place on recorded logs.
 //! * [`localization`]: how well a robot is tracked, and whether it notices that it is lost.
 //! * [`structures`]: whether and how fast a place is found among landmarks.
 //! * [`figure`]: a hallway's map as a picture.
@@ -49,6 +50,7 @@ pub mod level;
 pub mod localization;
 pub mod meter;
 pub mod page;
+pub mod places;
 pub mod plane;
 pub mod plans;
 pub mod programs;

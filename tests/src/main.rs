@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use mapfold_tests::{
     buildings, change, differences, evaluation, extraction, figure, growth, honesty, localization,
-    plans, range, raster, serving, speed, structures,
+    places, plans, range, raster, serving, speed, structures,
 };
 
 /// Measures Mapfold and rewrites the tables of a report between their markers.
@@ -102,6 +102,15 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         report: PathBuf,
     },
+    /// Lets robots that know nothing find their places on logs that are not in their maps
+    Places {
+        /// The page with the markers `places`
+        #[arg(long, value_name = "FILE")]
+        report: PathBuf,
+        /// A folder with further logs, in `logs/`
+        #[arg(long, value_name = "DIR")]
+        data: Option<PathBuf>,
+    },
     /// Draws a hallway's vector map from a few scans of the committed log
     Figure {
         /// The SVG to write
@@ -156,6 +165,7 @@ async fn main() -> ExitCode {
         Command::Serving { report } => serving::tables(&report).await,
         Command::Structures { report } => structures::table(&report),
         Command::Localization { report } => localization::tables(&report),
+        Command::Places { report, data } => places::table(&report, data.as_deref()),
         Command::Figure { out } => figure::write(&out).await.map(|()| Vec::new()),
         Command::Raster { report, picture } => raster::raster(&report, &picture),
         Command::Benches { report, criterion } => speed::benches(&report, &criterion),
