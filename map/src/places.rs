@@ -2,7 +2,7 @@
 //!
 //! Landmarks propose, the whole look disposes. A likelihood field ([`LikelihoodField`]) says of every cell of
 //! the raster how well the end of a beam fits there: on a wall, in the unknown, in what is known to be
-//! free. A place weighs what its beams' ends come to, and what they would have passed through. [`search`]
+//! free. A place weighs what its beams' ends come to, and what they would have passed through. [`search()`]
 //! finds every place whose weight comes near the best one's, by branch and bound over headings that
 //! bring walls onto walls: what it does not name has been shown to weigh less. So whoever finds one place
 //! alone may believe it, and whoever finds several knows between which to tell.

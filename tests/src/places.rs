@@ -34,7 +34,7 @@ struct Look {
 /// What drives of one kind came to.
 #[derive(Debug, Clone, Default)]
 struct Drives {
-    drives: u32,
+    all: u32,
     right: u32,
     wrong: u32,
     undecided: u32,
@@ -99,7 +99,7 @@ fn step(from: &Look, to: &Look) -> Pose<Robot, Robot> {
 /// is a clock in seconds.
 fn drives(looks: &[Look], mapped: Mapped, now: &dyn Fn() -> f64) -> [Drives; 2] {
     let is_mapped = |index: usize| match mapped {
-        Mapped::OtherBlocks => index / BLOCK % 2 == 0,
+        Mapped::OtherBlocks => (index / BLOCK).is_multiple_of(2),
         Mapped::FirstHalf => 2 * index < looks.len(),
     };
     let of_map = || looks.iter().enumerate().filter(|(i, _)| is_mapped(*i)).map(|(_, look)| look);
@@ -124,7 +124,7 @@ fn drives(looks: &[Look], mapped: Mapped, now: &dyn Fn() -> f64) -> [Drives; 2] 
 }
 
 fn drive(looks: &[Look], field: &LikelihoodField, now: &dyn Fn() -> f64, into: &mut Drives) {
-    into.drives += 1;
+    into.all += 1;
     let mut seeker = Seeker::new(SeekerConfig::STANDARD, PlacesConfig::STANDARD);
     let mut way = 0.0;
     for (index, look) in looks.iter().enumerate() {
@@ -177,10 +177,10 @@ pub fn table(page: &Path, data: Option<&Path>) -> Result<Vec<String>, Error> {
         {
             let both = drives(&looks, mapped, &now);
             for (where_to, drives) in ["reaches", "does not reach"].into_iter().zip(&both) {
-                if drives.drives == 0 {
+                if drives.all == 0 {
                     continue;
                 }
-                let counts = [drives.drives, drives.right, drives.undecided, drives.wrong];
+                let counts = [drives.all, drives.right, drives.undecided, drives.wrong];
                 let [median, p95] = [0.5, 0.95].map(|q| {
                     if drives.way.is_empty() {
                         "-".to_owned()
@@ -197,7 +197,7 @@ pub fn table(page: &Path, data: Option<&Path>) -> Result<Vec<String>, Error> {
                 report::say(&row.join(" | "));
                 rows.push(row);
                 wrong += drives.wrong;
-                all += drives.drives;
+                all += drives.all;
             }
         }
     }

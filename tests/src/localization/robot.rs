@@ -29,7 +29,7 @@ pub(super) enum Eyes {
     Sonar(SonarRing, SonarProfile),
 }
 
-/// Kinds of [`Eyes`].
+/// Kinds of `Eyes`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sensor {
     /// [`Eyes::Infrared`].
