@@ -29,14 +29,14 @@ pub(super) enum Eyes {
     Sonar(SonarRing, SonarProfile),
 }
 
-/// Kinds of `Eyes`.
+/// What a robot sees with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sensor {
-    /// [`Eyes::Infrared`].
+    /// An infrared head with its table.
     Infrared,
-    /// [`Eyes::Modern`].
+    /// A modern scanner with a noise of a centimetre.
     Modern,
-    /// [`Eyes::Sonar`].
+    /// A ring of sonars.
     Sonar,
 }
 
