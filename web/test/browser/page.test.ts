@@ -362,13 +362,13 @@ describe("the operator", () => {
     await choose("image: floor.pgm\nresolution: 0.05\n");
     await page.fill("#prior-trust", "0.8");
     await page.click("#prior-preview");
-    await page.waitForSelector(".prior-told");
+    await page.waitForSelector(".prior-card .prior-told");
     await page.waitForSelector(".prior-card .problem", { state: "hidden" });
-    const told = await page.innerText(".prior-told");
+    const told = await page.innerText(".prior-card .prior-told");
     for (const words of ["floor.pgm, 40 × 20 pixels", "5 cm a pixel", "x -1.50 m, y 2.25 m", "trinary", "0.65", "0.196", "0.8"]) {
       expect(told).toContain(words);
     }
-    expect(await page.innerText(".prior-warnings")).toContain("yaw is 0");
+    expect(await page.innerText(".prior-card .prior-warnings")).toContain("yaw is 0");
     expect(mock.prior.imports).toHaveLength(0);
 
     // Another trust is another question.
