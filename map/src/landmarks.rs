@@ -9,10 +9,12 @@
 //!
 //! Of many landmarks [`select`] chooses those that are good to find oneself by.
 //!
-//! Landmarks come from walls, those of one look ([`landmarks_of_look`]) or of the map ([`landmarks_of_map`]); those of
+//! Landmarks come from walls, those of one look ([`landmarks_of_look`]) or of the map ([`landmarks_of_map`], one for each
+//! thing, from however many sides it was seen); those of
 //! the a-priori model come from `gdb`, and what the model knows the map need not tell again ([`told_by`]).
 //! Knows nothing of scans.
 
+mod both_sides;
 mod faces;
 mod fit;
 mod goodness;
@@ -28,6 +30,7 @@ mod table;
 
 use crate::geometry::{Covariance, Point, difference};
 
+pub use both_sides::BothSidesConfig;
 pub use faces::{FacesConfig, landmarks_of_look};
 pub use fit::{Correspondence, FitError, PoseFit, fit_pose};
 pub use goodness::{Applied, Goodness, GoodnessConfig, Traits};

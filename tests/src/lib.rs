@@ -27,6 +27,7 @@
 //! * [`places`]: whether a robot that knows nothing finds its place on recorded logs.
 //! * [`localization`]: how well a robot is tracked, and whether it notices that it is lost.
 //! * [`structures`]: whether and how fast a place is found among landmarks.
+//! * [`taught`]: what robots teach of thin walls.
 //! * [`figure`]: a hallway's map as a picture.
 //! * [`evaluation`], [`speed`], [`statistics`], [`report`]: `mapfold-evaluate`, which writes tables between markers
 //!   into a page of text.
@@ -65,6 +66,7 @@ pub mod speed;
 pub mod statistics;
 pub mod structures;
 mod surveying;
+pub mod taught;
 pub mod trial;
 pub mod yardstick;
 

@@ -63,6 +63,8 @@ pub(super) struct Face {
     covariance: Covariance<2>,
     /// Stretches of its line that were looked through, by that coordinate, metres.
     open: Vec<(f64, f64)>,
+    /// Whether beams of many looks passed its physical ends, so that nothing is between two such ends of two walls: in maps.
+    is_of_map: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -94,7 +96,12 @@ impl Face {
             Facing::Origin => (tangent, low, high),
             Facing::Away => (-tangent, high, low),
         };
-        Self { wall, direction, tail, head, tangent, covariance, open }
+        Self { wall, direction, tail, head, tangent, covariance, open, is_of_map: false }
+    }
+
+    /// The same of a map.
+    pub(super) fn of_map(self) -> Self {
+        Self { is_of_map: true, ..self }
     }
 
     fn length(&self) -> f64 {
@@ -226,7 +233,9 @@ fn doorway(a: &Face, b: &Face, config: &FacesConfig) -> Option<Found> {
         && a.direction.dot(&b.direction) > 0.0
         && a.direction.perp(&b.direction).abs() <= config.doorway_off.1;
     let open = a.open_between(&a.head.at, &b.tail.at).max(b.open_between(&a.head.at, &b.tail.at));
-    if !fits || open < config.seen_through * width {
+    let are_ends = [a.head.kind, b.tail.kind] == [EndKind::Jump; 2];
+    let are_of_map = a.is_of_map && b.is_of_map && a.wall != b.wall;
+    if !fits || (open < config.seen_through * width && !(are_of_map && are_ends)) {
         return None;
     }
     let at = (a.head.at + b.tail.at) * 0.5;

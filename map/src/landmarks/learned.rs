@@ -6,8 +6,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::faces::{self, Face, Found};
-use super::{FacesConfig, Landmark, LandmarkKind};
+use super::both_sides::{Thing, things};
+use super::faces::{self, Face};
+use super::{BothSidesConfig, FacesConfig, Landmark, LandmarkKind};
 use crate::level::{FeatureId, RobotName};
 use crate::vector::{ConfirmedConfig, EndKind, Segment};
 
@@ -16,6 +17,8 @@ use crate::vector::{ConfirmedConfig, EndKind, Segment};
 pub struct LearnedConfig {
     /// Which faces make one.
     pub faces: FacesConfig,
+    /// Which of them are one thing seen from two sides.
+    pub both_sides: BothSidesConfig,
     /// Which walls are well supported: only their confirmed parts count.
     pub confirmed: ConfirmedConfig,
     /// Deviation along the wall of an end of the map, metres.
@@ -24,8 +27,12 @@ pub struct LearnedConfig {
 
 impl LearnedConfig {
     /// The defaults: confirmed like walls that explain cells.
-    pub const STANDARD: Self =
-        Self { faces: FacesConfig::STANDARD, confirmed: ConfirmedConfig::STANDARD, end_sd: 0.05 };
+    pub const STANDARD: Self = Self {
+        faces: FacesConfig::STANDARD,
+        both_sides: BothSidesConfig::STANDARD,
+        confirmed: ConfirmedConfig::STANDARD,
+        end_sd: 0.05,
+    };
 }
 
 /// Identity of a learned landmark: what it is, and of which walls. Where it lies moves a little with every
@@ -34,10 +41,11 @@ impl LearnedConfig {
 pub struct LearnedId {
     /// What it is.
     pub kind: LandmarkKind,
-    /// The wall before and the wall after it, free space on the left; the same twice if there is one only.
+    /// The wall before and the wall after it, free space on the left; the same twice if there is one only. Of a doorway
+    /// those of its side with the smaller ones.
     pub walls: [FeatureId; 2],
     /// Of ends and doorways: twice the coordinate along the first wall in half metres, and one more for an end
-    /// where its face begins. Of corners 0: two walls meet once.
+    /// where its only face begins. Of corners 0: two walls meet once.
     pub place: i32,
 }
 
@@ -48,9 +56,12 @@ pub struct LearnedLandmark {
     pub id: LearnedId,
     /// What, where and with which direction; that of a doorway is in (-pi/2, pi/2].
     pub landmark: Landmark,
-    /// The angle of free space at a corner, radians; the width of a doorway, metres; 0 for an end.
+    /// The angle of free space at a corner, radians; the width of a doorway or of an end, metres (0 for an end of which one
+    /// side is known).
     pub extent: f64,
-    /// Quality: the least of its walls' numbers of looks.
+    /// All its walls, ascending.
+    pub walls: Vec<FeatureId>,
+    /// Quality: of each side the least of its walls' numbers of looks, added up: no look sees both sides of a wall.
     pub looks: u32,
     /// Who saw any of its walls, ascending.
     pub robots: Vec<RobotName>,
@@ -78,36 +89,52 @@ pub fn landmarks_of_map<'a>(
             ];
             let covariance = segment.independent + segment.dependent;
             let facing = segment.facing;
-            faces.push(Face::new(wall, &segment.line, covariance, facing, ends, open.clone()));
+            let face = Face::new(wall, &segment.line, covariance, facing, ends, open.clone());
+            faces.push(face.of_map());
         }
     }
     let mut learned = BTreeMap::new();
-    for found in faces::landmarks(faces, &config.faces) {
-        let made = known(&found, &segments);
+    for thing in things(faces::landmarks(faces, &config.faces), &config.both_sides) {
+        let made = known(&thing, &segments);
         learned.entry(made.id).or_insert(made);
     }
     learned
 }
 
-fn known(found: &Found, segments: &[(&FeatureId, &Segment)]) -> LearnedLandmark {
-    let walls = found.walls.map(|wall| segments[wall]);
-    let mut landmark = found.landmark;
-    let along = walls[0].1.line.along(&landmark.at);
-    let place = match landmark.kind {
+fn known(thing: &Thing, segments: &[(&FeatureId, &Segment)]) -> LearnedLandmark {
+    let mut landmark = thing.landmark;
+    let kind = landmark.kind;
+    let ids = |walls: [usize; 2]| walls.map(|wall| *segments[wall].0);
+    let front = thing.front;
+    let (walls, is_tail) = match thing.back {
+        // Round the end, from the one face to the other.
+        Some(back) if kind == LandmarkKind::WallEnd => ([front.walls[0], back.walls[0]], false),
+        Some(back) if ids(back.walls) < ids(front.walls) => (back.walls, back.is_tail),
+        _ => (front.walls, front.is_tail),
+    };
+    let along = segments[walls[0]].1.line.along(&landmark.at);
+    let place = match kind {
         LandmarkKind::ConvexCorner | LandmarkKind::ConcaveCorner => 0,
         LandmarkKind::WallEnd | LandmarkKind::Doorway => {
-            2 * (2.0 * along).round() as i32 + i32::from(found.is_tail)
+            2 * (2.0 * along).round() as i32 + i32::from(is_tail)
         }
     };
-    if landmark.kind.is_two_sided() {
+    if kind.is_two_sided() {
         landmark.direction = one_of_two(landmark.direction);
     }
-    let robots: BTreeSet<&RobotName> = walls.iter().flat_map(|(_, wall)| &wall.robots).collect();
+    let sides = || std::iter::once(&front).chain(&thing.back);
+    let all: BTreeSet<usize> = sides().flat_map(|side| side.walls).collect();
+    let seen = |wall: &usize| segments[*wall].1;
+    let robots: BTreeSet<&RobotName> = all.iter().flat_map(|wall| &seen(wall).robots).collect();
+    let looks = sides().map(|side| side.walls.map(|wall| seen(&wall).looks));
+    let mut all: Vec<FeatureId> = all.iter().map(|wall| *segments[*wall].0).collect();
+    all.sort_unstable();
     LearnedLandmark {
-        id: LearnedId { kind: landmark.kind, walls: walls.map(|(id, _)| *id), place },
+        id: LearnedId { kind, walls: ids(walls), place },
         landmark,
-        extent: found.extent,
-        looks: walls[0].1.looks.min(walls[1].1.looks),
+        extent: thing.extent,
+        walls: all,
+        looks: looks.map(|[a, b]| a.min(b)).fold(0, u32::saturating_add),
         robots: robots.into_iter().cloned().collect(),
     }
 }

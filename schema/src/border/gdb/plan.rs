@@ -105,9 +105,7 @@ pub fn wire_gdb_landmark(planned: &PlannedLandmark) -> v1::Landmark {
 
 /// A landmark of the map.
 pub fn wire_learned_landmark(learned: &LearnedLandmark) -> v1::Landmark {
-    let [first, second] = learned.id.walls.map(|wall| feature_id(&wall));
-    let mut objects = vec![first];
-    objects.extend((learned.id.walls[0] != learned.id.walls[1]).then_some(second));
+    let objects = learned.walls.iter().map(feature_id).collect();
     let robots = learned.robots.iter().map(ToString::to_string).collect();
     v1::Landmark {
         source: v1::LandmarkSource::Learned,
