@@ -295,7 +295,7 @@ fn leader(leaders: &mut [usize], mut index: usize) -> usize {
     index
 }
 
-/// Whether objects of this kind are moved by people.
+/// Whether objects of this kind are moved by people; openings and floors are not things.
 pub(super) fn is_movable(kind: Kind) -> bool {
-    !matches!(kind, Kind::Wall | Kind::Doorway | Kind::Corridor)
+    !matches!(kind, Kind::Doorway | Kind::Corridor)
 }

@@ -1,7 +1,7 @@
 //! Objects that stand elsewhere: rigid motions that lay an object's surfaces on what was found.
 
 use std::collections::BTreeSet;
-use std::f64::consts::{FRAC_PI_4, TAU};
+use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -25,8 +25,13 @@ pub(super) struct Motion {
 
 /// Objects that are but drawn a little off are looked for this far, metres.
 const ASIDE_MAX: f64 = 0.5;
-/// Walls, which hide behind what is put before them, this far.
+/// Walls, which hide behind what is put before them, this far if no more than one face of them is seen.
 const WALL_ASIDE_MAX: f64 = 0.25;
+/// Walls that are gone are looked for this far, metres, and turned by no more than this, radians: in the same room, along the
+/// same axes. Beyond that a wall is another one, for many are alike.
+const WALL_MOVE_MAX: (f64, f64) = (3.0, 0.1);
+/// How much of a wall must have been found elsewhere, as a share of its extent: a piece is that of many walls.
+const WALL_SEEN_MIN: f64 = 0.8;
 /// Less is no motion, metres and radians.
 const MOTION_MIN: (f64, f64) = (0.02, 0.02);
 /// A place lies on a moved surface if it is no farther off, metres.
@@ -59,7 +64,14 @@ pub(super) fn motions(
     let mut motions = Vec::new();
     let mut taken = BTreeSet::new();
     for (owner, things) in things_near(surfaces, found) {
-        if let Some(motion) = aside(surfaces, owner, &things, found, scanned, config) {
+        let mut tried = |most| aside(surfaces, owner, &things, most, found, scanned, config);
+        let motion = match surfaces.owners[owner].kind {
+            kind if !is_movable(kind) => None,
+            // What stands before a wall would spoil the fit of one that is but a little off.
+            Kind::Wall => tried(WALL_ASIDE_MAX).or_else(|| tried(ASIDE_MAX)),
+            _ => tried(ASIDE_MAX),
+        };
+        if let Some(motion) = motion {
             taken.extend(motion.things.iter().copied());
             motions.push(motion);
         }
@@ -130,20 +142,16 @@ fn things_near(surfaces: &Surfaces, found: &Found<'_>) -> Vec<(usize, BTreeSet<u
     by_owner
 }
 
-/// Whether all that was found of an object, in its place and near it, is the object a little aside.
+/// Whether all that was found of an object, in its place and near it, is the object at most so many metres aside.
 fn aside(
     surfaces: &Surfaces,
     owner: usize,
     things: &BTreeSet<usize>,
+    most: f64,
     found: &Found<'_>,
     scanned: &mut Scanned<'_>,
     config: &ChangeConfig,
 ) -> Option<Motion> {
-    let kind = surfaces.owners[owner].kind;
-    if matches!(kind, Kind::Doorway | Kind::Corridor) {
-        return None;
-    }
-    let most = if kind == Kind::Wall { WALL_ASIDE_MAX } else { ASIDE_MAX };
     let is_of = |place: &Place| {
         surfaces.of_owner(owner).any(|(_, surface)| {
             let faces = place.normal.is_none_or(|normal| surface.faces(&normal));
@@ -170,7 +178,9 @@ fn aside(
         return None;
     }
     let [hit, through] = probed(&outline, &motion, scanned, config);
-    if !is_there(hit, through, config) {
+    let is_wall = surfaces.owners[owner].kind == Kind::Wall;
+    let is_far = is_wall && away > WALL_ASIDE_MAX && hit < OUTLINE_SHARE_MIN * whole(&outline);
+    if !is_there(hit, through, config) || is_far {
         return None;
     }
     let covered = |index: &&usize| {
@@ -192,7 +202,9 @@ fn elsewhere(
 ) -> Option<Fitted> {
     let ends = || surfaces.ends_of(owner);
     let (size, seen) = (extent(ends()), extent(places.iter().map(|place| place.at)));
-    if !(0.4 * size..=1.1 * size + config.slack).contains(&seen) {
+    let is_wall = surfaces.owners[owner].kind == Kind::Wall;
+    let seen_min = if is_wall { WALL_SEEN_MIN } else { 0.4 };
+    if !(seen_min * size..=1.1 * size + config.slack).contains(&seen) {
         return None;
     }
     let (middle, there) = (mean(ends()), mean(places.iter().map(|place| place.at)));
@@ -200,21 +212,28 @@ fn elsewhere(
         return None;
     }
     let outline: Vec<Surface> = surfaces.of_owner(owner).map(|(_, surface)| *surface).collect();
+    let (away_max, turn_max) = if is_wall { WALL_MOVE_MAX } else { (config.move_max, PI) };
     let fits = turns(&outline, places).into_iter().filter_map(|turn| {
         let turned = Pose::<Level, Level>::new(0.0, 0.0, turn);
         let shift = there - turned.act(&middle);
         let fitted = fit(&outline, places, Pose::new(shift.x, shift.y, turn))?;
-        (fitted.share >= SHARE_MIN).then_some(fitted)
+        let turn = fitted.motion.heading().abs();
+        (fitted.share >= SHARE_MIN && turn <= turn_max).then_some(fitted)
     });
     let mut fits: Vec<Fitted> = fits.collect();
     fits.sort_by_key(rank);
-    let whole: f64 = outline.iter().map(|surface| surface.length).sum();
+    let whole = whole(&outline);
     let is_told = |fitted: &Fitted, scanned: &mut Scanned<'_>| {
         let [hit, through] = probed(&outline, &fitted.motion, scanned, config);
         is_there(hit, through, config) && hit >= OUTLINE_SHARE_MIN * whole
     };
     let best = fits.into_iter().find(|fitted| is_told(fitted, scanned))?;
-    (distance(surfaces, owner, &best.motion) <= config.move_max).then_some(best)
+    (distance(surfaces, owner, &best.motion) <= away_max).then_some(best)
+}
+
+/// Metres of an outline.
+fn whole(outline: &[Surface]) -> f64 {
+    outline.iter().map(|surface| surface.length).sum()
 }
 
 /// Turns of the outline that bring one of its surfaces to face like one of the places.

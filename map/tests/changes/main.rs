@@ -159,3 +159,42 @@ fn a_door_is_no_new_thing_whether_open_or_closed() {
         assert_eq!(told(objects.clone(), &painted(&[sides[0], sides[1], leaf], 5)), []);
     }
 }
+
+/// A partition of 10 cm and 5 m that stands freely, or from wall to wall, put somewhere else.
+#[test]
+fn a_wall_that_was_put_elsewhere_has_moved() {
+    for (from, to) in [(1.0, 6.0), (0.0, 8.0)] {
+        let meant = wall(from, to);
+        for off in [0.2, 0.25, 0.3, 0.4, 0.5, 1.0, 2.0] {
+            let there = Thing { middle: meant.middle + Point::new(0.0, off), ..meant };
+            let map = painted(&[there], 5);
+            let (middle, heading) = moved(with(solid(Kind::Wall, &meant)), &map, &meant);
+            assert!((middle - there.middle).norm() < 0.01 && heading.abs() < 0.01, "{middle}");
+        }
+    }
+}
+
+#[test]
+fn another_wall_elsewhere_is_not_the_one_that_is_gone() {
+    let meant = wall(1.0, 6.0);
+    let shorter = Thing { middle: Point::new(3.5, 4.5), half: Point::new(1.5, 0.05), turn: 0.0 };
+    let turned = Thing { middle: Point::new(3.5, 3.4), half: Point::new(2.5, 0.05), turn: 0.5 };
+    for there in [shorter, turned] {
+        let told = told(with(solid(Kind::Wall, &meant)), &painted(&[there], 5));
+        let is_moved = |change: &Change| matches!(change.id, ChangeId::Moved(_));
+        assert!(!told.iter().any(is_moved), "{told:?}");
+        assert!(told.iter().any(|change| matches!(change.id, ChangeId::New(_))), "{told:?}");
+        let is_about = |change: &Change| {
+            [ChangeId::Missing(id(4)), ChangeId::Opened(id(4))].contains(&change.id)
+        };
+        assert!(told.iter().any(is_about), "{told:?}");
+    }
+}
+
+#[test]
+fn shelves_along_a_wall_are_not_the_wall_moved_into_the_room() {
+    // Before all of the lower wall, which nobody sees any more.
+    let shelves = Thing { middle: Point::new(4.0, 0.2), half: Point::new(4.0, 0.2), turn: 0.0 };
+    let told = told(room(), &painted(&[shelves], 5));
+    assert!(told.iter().all(|change| !matches!(change.id, ChangeId::Moved(_))), "{told:?}");
+}
