@@ -2,10 +2,11 @@
 //! SQL, nor where the bytes go.
 //!
 //! Equal maps give equal bytes: nothing here writes the time of day, an address or a version. GeoJSON,
-//! which mirrors write too, is in `mapfold_schema::geojson`.
+//! which mirrors write too, is written by `mapfold_schema::geojson`.
 //!
 //! * [`building`]: a building of Open-RMF's traffic editor, in.
 //! * [`dxf`]: drawings, in and out.
+//! * [`geojson`]: flat plans, in.
 //! * [`glb`]: models in three dimensions, in and out.
 //! * [`incoming`], [`outgoing`]: models of any format on their way in and out.
 //! * [`jsonfg`]: a model with its prototypes, whole, out and in.
@@ -16,6 +17,8 @@
 mod affine;
 pub mod building;
 pub mod dxf;
+mod few;
+pub mod geojson;
 pub mod glb;
 pub mod incoming;
 pub mod jsonfg;

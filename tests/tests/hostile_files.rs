@@ -24,6 +24,7 @@ const YAML: &str = "application/yaml";
 const DXF: &str = "image/vnd.dxf";
 const GLB: &str = "model/gltf-binary";
 const FG: &str = "application/fg+json";
+const GEO: &str = "application/geo+json";
 const ZIP: &str = "application/zip";
 
 /// What the process may take, kilobytes: some hundred times the largest of these files.
@@ -178,6 +179,41 @@ fn documents() -> Vec<File> {
     ]
 }
 
+fn plans() -> Vec<File> {
+    let plan = |frame: &str, features: &str| {
+        format!("{{\"type\":\"FeatureCollection\",{frame}\"features\":[{features}]}}")
+    };
+    let metres = "\"coordinate_frame\":{\"unit\":\"m\"},";
+    let feature = |kind: &str, coordinates: &str, properties: &str| {
+        format!(
+            "{{\"type\":\"Feature\",\"geometry\":{{\"type\":\"{kind}\",\"coordinates\":{coordinates}}},\"properties\":{{{properties}}}}}"
+        )
+    };
+    let line = feature("LineString", "[[0,0],[40,30]]", "");
+    let ring: Vec<String> = (0..60_000).map(|k| format!("[{},{}]", k % 7, k % 11)).collect();
+    let tangled = format!("[[{},[0,0]]]", ring.join(","));
+    let obstacle = "\"kind\":\"gdb\",\"shape\":\"obstacle\"";
+    let tangled = feature("Polygon", &tangled, obstacle);
+    let far = feature("LineString", "[[0,0],[1e300,0]]", "");
+    vec![
+        file("deep lists", GEO, "[".repeat(1 << 20), ""),
+        file(
+            "deep coordinates",
+            GEO,
+            plan(metres, &feature("Polygon", &"[".repeat(1 << 20), "")),
+            "",
+        ),
+        file("a wall across continents", GEO, plan("", &line), "unit_m"),
+        file("a wall without end", GEO, plan(metres, &far), ""),
+        file("a million features", GEO, plan(metres, &vec!["{}"; 1_000_000].join(",")), "200000"),
+        // Drafts may have faults; they are named.
+        File {
+            status: 200,
+            ..file("a tangled outline", GEO, plan(metres, &tangled), "meets_itself")
+        },
+    ]
+}
+
 fn deflated(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = DeflateEncoder::new(Vec::new(), Compression::best());
     encoder.write_all(bytes).expect("a vector takes it");
@@ -241,7 +277,8 @@ fn maps() -> Vec<File> {
 async fn no_file_harms_a_server() -> Result<(), Error> {
     let server = Server::start(Database::Sqlite).await?;
     let level = Level::create(server.api()?, "plant", "floor").await?;
-    let files = [buildings(), drawings(), models(), documents(), maps()].into_iter().flatten();
+    let files =
+        [buildings(), drawings(), models(), documents(), plans(), maps()].into_iter().flatten();
     let path = level.path(route::IMPORTS);
     let (done, others) = (AtomicBool::new(false), AtomicU32::new(0));
     let asking = async {

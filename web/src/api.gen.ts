@@ -394,7 +394,7 @@ export interface paths {
          *     A model as JSON-FG (`application/fg+json`: a `GdbDocument`, as `exports/jsonfg` gives it) goes there too, and its prototypes
          *     into the library of the site, of which no prototype is changed: one whose name is taken gets a name of its own. So does
          *     a drawing (ASCII DXF, `image/vnd.dxf`): walls of pairs of parallel lines, doorways of swings of doors, blocks as
-         *     prototypes; a map, with `into=gdb`: its occupied cells as walls; and a model in three dimensions (GLB, `model/gltf-binary`). The answer is a `ModelImport`, which tells what was left out, and why.
+         *     prototypes; a flat plan (`application/geo+json`, such as `exports/geojson?of=gdb`): its outlines drawn up; a map, with `into=gdb`: its occupied cells as walls; and a model in three dimensions (GLB, `model/gltf-binary`). The answer is a `ModelImport`, which tells what was left out, and why.
          */
         post: operations["import"];
         /**
@@ -1888,7 +1888,7 @@ export interface components {
          * @description Formats that a model comes in as.
          * @enum {string}
          */
-        ModelFormat: "jsonfg" | "dxf" | "glb" | "nav2";
+        ModelFormat: "jsonfg" | "geojson" | "dxf" | "glb" | "nav2";
         /** @description The answer to the import of a model: what was found, and what became of it. */
         ModelImport: {
             answer?: components["schemas"]["GdbAnswer"] | null;
@@ -4105,9 +4105,9 @@ export interface operations {
                  *     for any letters, and a kind may be `skip`.
                  */
                 layers?: string;
-                /** @description Of a drawing: metres of one unit, if what it says itself is not so. */
+                /** @description Of a drawing or a plan: metres of one unit, if what it says itself is not so. */
                 unit_m?: number;
-                /** @description Of a drawing: height of walls that are drawn flat; 2.5 if absent. */
+                /** @description Of a drawing or a plan: height of walls that are drawn flat; 2.5 if absent. */
                 wall_height_m?: number;
             };
             header?: never;

@@ -47,7 +47,8 @@ export function sendingOf(names: readonly string[], { level, unit }: Pick<FilesS
   if (ends(/\.ya?ml$/i)) return { mediaType: "application/yaml", zipped: false, query: level === "" ? {} : { building_level: level } };
   if (ends(/\.dxf$/i)) return { mediaType: "image/vnd.dxf", zipped: false, query: unit === "" ? {} : { unit_m: unit } };
   if (ends(/\.glb$/i)) return { mediaType: "model/gltf-binary", zipped: false, query: {} };
-  if (ends(/\.(json|jsonfg|geojson)$/i)) return { mediaType: "application/fg+json", zipped: false, query: {} };
+  if (ends(/\.(json|jsonfg)$/i)) return { mediaType: "application/fg+json", zipped: false, query: {} };
+  if (ends(/\.geojson$/i)) return { mediaType: "application/geo+json", zipped: false, query: {} };
   return null;
 }
 

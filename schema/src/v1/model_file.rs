@@ -42,6 +42,8 @@ pub struct GdbDocument {
 pub enum ModelFormat {
     /// JSON-FG.
     Jsonfg,
+    /// A flat plan as GeoJSON.
+    Geojson,
     /// A drawing (DXF).
     Dxf,
     /// Binary glTF.

@@ -151,7 +151,7 @@ pub(super) struct ExportCommand {
 #[derive(Debug, Args)]
 pub(super) struct ImportCommand {
     /// The YAML of a `map_server` map, with its image beside it; or a zip of both; or a `*.building.yaml` of Open-RMF; or a
-    /// model as JSON-FG (`*.json`), a drawing (`*.dxf`) or a model in
+    /// model as JSON-FG (`*.json`), a plan as GeoJSON (`*.geojson`), a drawing (`*.dxf`) or a model in
     /// three dimensions (`*.glb`)
     pub(super) file: PathBuf,
     /// Slug of the site

@@ -12,7 +12,7 @@ use super::import_draft::{Draft, new_entry, tell_findings, unreadable, unwritten
 use super::{CommandError, say};
 use crate::config::Config;
 use crate::exchange::incoming::{FILE_BYTES_MAX, Incoming};
-use crate::exchange::{dxf, glb, jsonfg};
+use crate::exchange::{dxf, geojson, glb, jsonfg};
 use crate::level::gdb::columns;
 use crate::store::gdb::{Expected, GdbVersion};
 use crate::store::library::LibraryOutcome;
@@ -21,7 +21,8 @@ use crate::store::library::LibraryOutcome;
 pub(super) fn format_of(path: &Path) -> Option<ModelFormat> {
     let end = path.extension()?.to_string_lossy().to_ascii_lowercase();
     match end.as_str() {
-        "json" | "jsonfg" | "geojson" => Some(ModelFormat::Jsonfg),
+        "json" | "jsonfg" => Some(ModelFormat::Jsonfg),
+        "geojson" => Some(ModelFormat::Geojson),
         "dxf" => Some(ModelFormat::Dxf),
         "glb" => Some(ModelFormat::Glb),
         _ => None,
@@ -43,10 +44,16 @@ pub(super) async fn run(
             let package = import::read(&command.file)?;
             package.walls(frame, known).map(|(incoming, _)| incoming)
         }
-        ModelFormat::Dxf => {
+        ModelFormat::Dxf | ModelFormat::Geojson => {
             let DrawingOptions { layers, unit_m, wall_height_m } = &command.drawing;
             let options = dxf::Options::new(layers.as_deref(), *unit_m, *wall_height_m);
-            dxf::read(&bytes, frame, known, &options.map_err(refused)?)
+            let options = options.map_err(refused)?;
+            if format == ModelFormat::Dxf {
+                dxf::read(&bytes, frame, known, &options)
+            } else {
+                let dxf::Options { unit_m, wall_height_m, .. } = options;
+                geojson::read(&bytes, frame, known, &geojson::Options { unit_m, wall_height_m })
+            }
         }
     };
     let Incoming { objects, prototypes, report } = read.map_err(|e| refused(e.to_string()))?;

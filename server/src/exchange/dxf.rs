@@ -23,6 +23,8 @@ mod tagged;
 mod writing;
 
 pub use layers::LayerTable;
+pub(super) use objects::upright_box;
+pub(super) use prototypes::{area, corners, heights, prism};
 pub use reading::{Options, read};
 pub use writing::write;
 

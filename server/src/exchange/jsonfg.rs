@@ -74,3 +74,6 @@ pub fn read(
     found.prototypes = checked.prototypes;
     found.settled(library)
 }
+
+#[cfg(test)]
+mod tests;

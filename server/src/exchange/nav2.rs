@@ -60,4 +60,6 @@ impl Mode {
 }
 
 #[cfg(test)]
+mod changed_packages;
+#[cfg(test)]
 mod round_trips;

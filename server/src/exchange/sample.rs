@@ -114,3 +114,22 @@ pub(super) fn words(objects: &BTreeMap<Uuid, GdbObject>) -> Vec<String> {
     };
     objects.iter().map(word).collect()
 }
+
+/// Changes a file: bytes replaced, taken out and put in, digits for others, and all after a place cut off (once in
+/// a while, or little would be left to read).
+pub(super) fn changed(bytes: &mut Vec<u8>, edits: &[(proptest::sample::Index, u8, u8)]) {
+    for (at, byte, what) in edits {
+        if bytes.is_empty() {
+            return;
+        }
+        let at = at.index(bytes.len());
+        match what {
+            0 => bytes[at] = *byte,
+            1 => bytes[at] = byte % 10 + b'0',
+            2 => drop(bytes.remove(at)),
+            3 => bytes.insert(at, byte % 10 + b'0'),
+            _ if *byte < 64 => bytes.truncate(at),
+            _ => bytes[at] ^= 1 << (byte % 8),
+        }
+    }
+}

@@ -20,7 +20,7 @@ use super::state::App;
 use crate::auth;
 use crate::exchange::incoming::FileFault;
 use crate::exchange::nav2::{ImportError, Package, Trust};
-use crate::exchange::{dxf, glb, jsonfg};
+use crate::exchange::{dxf, geojson, glb, jsonfg};
 use crate::level::gdb::WireLibrary;
 use crate::store::imports::NewImport;
 
@@ -62,9 +62,9 @@ pub(super) struct ImportQuery {
     /// Of a drawing: which layer is what, before the table of names after AIA and NCS: `PATTERN=KIND,...`, where a star stands
     /// for any letters, and a kind may be `skip`.
     layers: Option<String>,
-    /// Of a drawing: metres of one unit, if what it says itself is not so.
+    /// Of a drawing or a plan: metres of one unit, if what it says itself is not so.
     unit_m: Option<f64>,
-    /// Of a drawing: height of walls that are drawn flat; 2.5 if absent.
+    /// Of a drawing or a plan: height of walls that are drawn flat; 2.5 if absent.
     wall_height_m: Option<f64>,
 }
 
@@ -106,7 +106,7 @@ pub(super) struct PageQuery {
 /// A model as JSON-FG (`application/fg+json`: a `GdbDocument`, as `exports/jsonfg` gives it) goes there too, and its prototypes
 /// into the library of the site, of which no prototype is changed: one whose name is taken gets a name of its own. So does
 /// a drawing (ASCII DXF, `image/vnd.dxf`): walls of pairs of parallel lines, doorways of swings of doors, blocks as
-/// prototypes; a map, with `into=gdb`: its occupied cells as walls; and a model in three dimensions (GLB, `model/gltf-binary`). The answer is a `ModelImport`, which tells what was left out, and why.
+/// prototypes; a flat plan (`application/geo+json`, such as `exports/geojson?of=gdb`): its outlines drawn up; a map, with `into=gdb`: its occupied cells as walls; and a model in three dimensions (GLB, `model/gltf-binary`). The answer is a `ModelImport`, which tells what was left out, and why.
 #[utoipa::path(
     post, path = route::IMPORTS, operation_id = "import", tag = "map",
     params(("site" = String, Path), ("level" = String, Path), ImportQuery),
@@ -145,6 +145,11 @@ pub(super) async fn create(
         let taking = model_imports::Taking { preview, replace };
         let read = move |frame, library: &WireLibrary| match format {
             ModelFormat::Jsonfg => jsonfg::read(&bytes, frame, library),
+            ModelFormat::Geojson => {
+                let dxf::Options { unit_m, wall_height_m, .. } = drawing;
+                let options = geojson::Options { unit_m, wall_height_m };
+                geojson::read(&bytes, frame, library, &options)
+            }
             ModelFormat::Dxf => dxf::read(&bytes, frame, library, &drawing),
             ModelFormat::Glb => glb::read(&bytes, frame, library),
             ModelFormat::Nav2 => Err(FileFault::at("the file", "a map comes as a zip")),

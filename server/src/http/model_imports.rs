@@ -23,8 +23,9 @@ use crate::store::gdb::{Expected, GdbVersion};
 use crate::store::library::LibraryOutcome;
 
 /// What models are sent as.
-const FORMATS: [(&[&str], ModelFormat); 3] = [
-    (&[jsonfg::MEDIA_TYPE, geojson::MEDIA_TYPE, "application/json"], ModelFormat::Jsonfg),
+const FORMATS: [(&[&str], ModelFormat); 4] = [
+    (&[jsonfg::MEDIA_TYPE, "application/json"], ModelFormat::Jsonfg),
+    (&[geojson::MEDIA_TYPE], ModelFormat::Geojson),
     (&dxf::MEDIA_TYPES, ModelFormat::Dxf),
     (&[glb::MEDIA_TYPE], ModelFormat::Glb),
 ];

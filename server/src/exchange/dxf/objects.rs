@@ -190,7 +190,7 @@ fn word(kind: ObjectKind) -> &'static str {
 }
 
 /// A box along a line, as long as the line is.
-fn upright_box(
+pub(in super::super) fn upright_box(
     kind: ObjectKind,
     [from, to]: [Point; 2],
     depth_m: f64,

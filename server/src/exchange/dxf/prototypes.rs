@@ -29,12 +29,12 @@ pub(super) fn height_m(kind: ObjectKind, wall_height_m: f64) -> f64 {
 }
 
 /// Heights of a flat thing: floors lie below the ground.
-pub(super) fn heights(kind: ObjectKind, wall_height_m: f64) -> [f64; 2] {
+pub(in super::super) fn heights(kind: ObjectKind, wall_height_m: f64) -> [f64; 2] {
     if kind == ObjectKind::Corridor { [-0.1, 0.0] } else { [0.0, height_m(kind, wall_height_m)] }
 }
 
 /// A ring drawn up; `None` if it encloses nothing.
-pub(super) fn prism(ring: &[Point], [lower_m, upper_m]: [f64; 2]) -> Option<GdbSolid> {
+pub(in super::super) fn prism(ring: &[Point], [lower_m, upper_m]: [f64; 2]) -> Option<GdbSolid> {
     let corners = corners(ring);
     let enclosed = area(ring).abs() > AREA_MIN_M2 && corners.len() > 2;
     let prism = || GdbPrism { base_m: vec![corners], lower_m, upper_m };
@@ -42,7 +42,7 @@ pub(super) fn prism(ring: &[Point], [lower_m, upper_m]: [f64; 2]) -> Option<GdbS
 }
 
 /// A ring without corners that stand twice.
-pub(super) fn corners(ring: &[Point]) -> Vec<[f64; 2]> {
+pub(in super::super) fn corners(ring: &[Point]) -> Vec<[f64; 2]> {
     let mut corners: Vec<[f64; 2]> = ring.iter().map(|p| [p.x, p.y]).collect();
     corners.dedup();
     while corners.len() > 1 && corners.first() == corners.last() {
@@ -52,7 +52,7 @@ pub(super) fn corners(ring: &[Point]) -> Vec<[f64; 2]> {
 }
 
 /// Signed area, square metres.
-pub(super) fn area(ring: &[Point]) -> f64 {
+pub(in super::super) fn area(ring: &[Point]) -> f64 {
     let Some(origin) = ring.first() else { return 0.0 };
     let next = ring.iter().cycle().skip(1);
     ring.iter().zip(next).map(|(p, q)| (p - origin).perp(&(q - origin))).sum::<f64>() / 2.0
