@@ -5,12 +5,12 @@ mod runs;
 use std::collections::BTreeMap;
 
 use mapfold_map::raster::{
-    Cell, EvidencePatch, LogOdds, SensorClass, TILE_CELLS, TILE_SIDE, TileIndex,
+    Cell, EvidencePatch, LogOdds, PatchPen, SensorClass, TILE_CELLS, TILE_SIDE, TileIndex,
 };
 
 use super::outline::whole;
 use super::window::{Rows, Window, bits};
-use runs::{Rounding, Runs, Sheet};
+use runs::{Rounding, Sheet};
 
 /// Grades of free evidence that whole pieces of rows can be laid with.
 pub(super) const GRADES: usize = 4;
@@ -39,7 +39,7 @@ pub struct Canvas {
     marked: Vec<u64>,
     /// Those values, millinats.
     values: Vec<i32>,
-    runs: Runs,
+    pen: PatchPen,
     pub(super) fan: super::scanner::Fan,
     pub(super) bumps: super::scanner::Bumps,
     pub(super) outline: super::outline::Outline,
@@ -139,15 +139,18 @@ impl Canvas {
     /// Lays a grade of "free" on the cells `from` to `to` (not included) of a row.
     #[inline]
     pub(super) fn lay(&mut self, row: i32, from: i32, to: i32, grade: usize) {
-        let to = to.min(self.window.columns());
-        let mut from = from.max(0);
+        let (to, mut from) = (to.min(self.window.columns()), from.max(0));
+        let grade = grade % GRADES;
         while from < to {
             let Some(word) = self.window.word(from, row) else { return };
+            let tile = word / TILE_SIDE;
+            let (Some(noted), Some(free)) = (self.noted.get_mut(tile), self.free.get_mut(tile))
+            else {
+                return;
+            };
             let until = to.min((from | (TILE_SIDE as i32 - 1)) + 1);
-            let grade = grade % GRADES;
-            self.noted[word / TILE_SIDE] |= 1 << grade;
-            self.free[word / TILE_SIDE][grade][word % TILE_SIDE] |=
-                bits(from as u32 % 64, (until - 1) as u32 % 64 + 1);
+            *noted |= 1 << grade;
+            free[grade][word % TILE_SIDE] |= bits(from as u32 % 64, (until - 1) as u32 % 64 + 1);
             from = until;
         }
     }
@@ -189,7 +192,7 @@ impl Canvas {
                     marked: &mut self.marked.as_chunks_mut().0[tile],
                     values: &mut self.values.as_chunks_mut().0[tile],
                 };
-                if let Some(patch) = self.runs.take(sheet, grades, rounding) {
+                if let Some(patch) = runs::take(sheet, grades, rounding, &mut self.pen) {
                     let index = TileIndex { x: corner.x + x as i32, y: corner.y + y as i32 };
                     tiles.insert(index, patch);
                 }

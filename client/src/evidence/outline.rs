@@ -88,19 +88,32 @@ impl Outline {
         let slope = (high.x - low.x) / (high.y - low.y);
         // Whether the ends of an edge that is all but level are in one row is a matter of rounding: what it
         // crosses lies between them all the same.
-        let crossed = low.x + (f64::from(from) - low.y) * slope;
-        let crossed = crossed.max(low.x.min(high.x)).min(low.x.max(high.x));
-        let mut x = fixed(crossed).wrapping_add((1 << POINT) - 1);
+        let crossed = fixed(low.x + (f64::from(from) - low.y) * slope);
+        let ends = [fixed(low.x), fixed(high.x)];
+        let crossed = crossed.max(ends[0].min(ends[1])).min(ends[0].max(ends[1]));
+        let mut x = crossed.wrapping_add((1 << POINT) - 1);
         let step = fixed(slope);
-        for row in from..to {
-            // Rounding over a window of a thousand rows: a thousandth of a cell.
-            let column = whole(x).max(0);
-            // What lies to the right of the window ends no row in it.
-            if let Some(word) = self.window.word(column, row) {
-                self.is_turned[word / TILE_SIDE] = true;
-                self.turned[word] ^= 1 << (column as usize % TILE_SIDE);
+        let (mut row, to, wide) = (from as usize, to as usize, self.window.tiles_wide);
+        // One row of tiles after the other: what is found by division stays the same in each.
+        while row < to {
+            let first = row / TILE_SIDE * wide;
+            let tiles = &mut self.turned.as_chunks_mut::<TILE_SIDE>().0[first..][..wide];
+            let is_turned = &mut self.is_turned[first..][..wide];
+            let until = to.min((row | (TILE_SIDE - 1)) + 1);
+            for row in row..until {
+                // Rounding over a window of a thousand rows: a thousandth of a cell.
+                let column = whole(x).max(0) as usize;
+                let tile = column / TILE_SIDE;
+                // What lies to the right of the window ends no row in it.
+                if let (Some(cells), Some(is_turned)) =
+                    (tiles.get_mut(tile), is_turned.get_mut(tile))
+                {
+                    cells[row % TILE_SIDE] ^= 1 << (column % TILE_SIDE);
+                    *is_turned = true;
+                }
+                x = x.wrapping_add(step);
             }
-            x = x.wrapping_add(step);
+            row = until;
         }
     }
 

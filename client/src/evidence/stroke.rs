@@ -17,14 +17,14 @@ pub(super) fn stroke(a: &Point, b: &Point, mut visit: impl FnMut(i32, i32, i32))
     let mut entered = cell(low.x);
     // Whether the ends of a line that is all but level are in one row is a matter of rounding: it goes no
     // farther than its ends all the same.
-    let (leftmost, rightmost) = (low.x.min(high.x), low.x.max(high.x));
+    let left = cell(high.x);
+    let (leftmost, rightmost) = (entered.min(left), entered.max(left));
     for row in first..last {
-        let left = cell(x.max(leftmost).min(rightmost));
+        let left = cell(x).max(leftmost).min(rightmost);
         visit(row, entered.min(left), entered.max(left) + 1);
         entered = left;
         x += slope;
     }
-    let left = cell(high.x);
     visit(last, entered.min(left), entered.max(left) + 1);
 }
 

@@ -75,6 +75,11 @@ impl TilePatch {
         Ok(Self { runs })
     }
 
+    /// The patch of runs that are known to ascend, not to overlap and not to be empty.
+    pub(super) fn of_sound(runs: Vec<EvidenceRun>) -> Self {
+        Self { runs }
+    }
+
     /// The first run that is not as it must be.
     #[cold]
     fn check(runs: &[EvidenceRun]) -> Result<(), RunError> {

@@ -1,6 +1,6 @@
 //! Bits and values of a tile, written down as the runs of a patch.
 
-use mapfold_map::raster::{EvidenceRun, LogOdds, TILE_CELLS, TILE_SIDE, TilePatch};
+use mapfold_map::raster::{LogOdds, PatchPen, RowRuns, TILE_CELLS, TILE_SIDE, TilePatch};
 
 use super::{GRADES, MARKED};
 use crate::evidence::window::Rows;
@@ -13,9 +13,6 @@ const OCCUPIED_MOST: i32 = 3000;
 /// Millinats of a log-odds step.
 const STEP: i32 = (1000.0 / LogOdds::STEPS_PER_NAT) as i32;
 
-/// No evidence for no cells.
-const NOTHING: EvidenceRun = EvidenceRun { start: 0, length: 0, value: 0 };
-
 /// A tile under way.
 pub(super) struct Sheet<'a> {
     /// The grades that were laid, and whether there are marks.
@@ -25,110 +22,49 @@ pub(super) struct Sheet<'a> {
     pub(super) values: &'a mut [i32; TILE_CELLS],
 }
 
-/// Where the runs of a tile are written down. Reused from tile to tile.
-#[derive(Debug, Default)]
-pub(super) struct Runs(Vec<EvidenceRun>);
-
-impl Runs {
-    /// Takes a tile's cells out as a patch, if they hold any evidence, and leaves it clean.
-    pub(super) fn take(
-        &mut self,
-        sheet: Sheet,
-        grades: [i16; GRADES],
-        rounding: Rounding,
-    ) -> Option<TilePatch> {
-        let Sheet { noted, free, marked, values } = sheet;
-        self.0.resize(TILE_CELLS, NOTHING);
-        let mut pen = Pen { runs: self.0.first_chunk_mut()?, count: 0, start: 0, end: 0, value: 0 };
-        let laid = noted & !MARKED;
-        let only = laid.trailing_zeros() as usize % GRADES;
-        if laid & laid.wrapping_sub(1) == 0 {
-            let (free, grade) = (&mut free[only], grades[only]);
-            for (row, (free, marked)) in free.iter().zip(&*marked).enumerate() {
-                let free = free & !marked;
-                let starts = (free & !(free << 1)) | marked;
-                let of_row = row * TILE_SIDE;
-                pen.row(starts, free & !starts, of_row, |at| {
-                    if marked >> at & 1 == 0 {
-                        return grade;
-                    }
-                    rounding.of(std::mem::take(&mut values[(of_row + at as usize) % TILE_CELLS]))
-                });
+/// Takes a tile's cells out as a patch, if they hold any evidence, and leaves it clean.
+pub(super) fn take(
+    sheet: Sheet,
+    grades: [i16; GRADES],
+    rounding: Rounding,
+    pen: &mut PatchPen,
+) -> Option<TilePatch> {
+    let Sheet { noted, free, marked, values } = sheet;
+    let laid = noted & !MARKED;
+    let only = laid.trailing_zeros() as usize % GRADES;
+    let patch = if laid & laid.wrapping_sub(1) == 0 {
+        let grade = grades[only];
+        let rows = free[only]
+            .iter()
+            .zip(&*marked)
+            .map(|(free, marked)| RowRuns::default().with_single(*marked).with_joined(*free));
+        let patch = pen.write(rows, |cell, is_marked| {
+            // Without a branch, for which cells are marked is anyone's guess: others have no value.
+            let value = rounding.of(std::mem::take(&mut values[cell % TILE_CELLS]));
+            if is_marked { value } else { grade }
+        });
+        free[only] = [0; TILE_SIDE];
+        patch
+    } else {
+        // Of each grade, what no higher one and no mark hides.
+        let rows = marked.iter().enumerate().map(|(row, marked)| {
+            let marks = RowRuns::default().with_single(*marked);
+            free.iter().rev().fold(marks, |runs, free| runs.with_joined(free[row]))
+        });
+        let patch = pen.write(rows, |cell, is_marked| {
+            let (row, column) = (cell / TILE_SIDE % TILE_SIDE, cell % TILE_SIDE);
+            if is_marked {
+                return rounding.of(std::mem::take(&mut values[cell % TILE_CELLS]));
             }
-            *free = [0; TILE_SIDE];
-        } else {
-            for (row, marked) in marked.iter().enumerate() {
-                let (mut hidden, mut starts) = (*marked, *marked);
-                // Of each grade, what no higher one and no mark hides.
-                let mut seen = [0; GRADES];
-                for (seen, free) in seen.iter_mut().zip(&*free).rev() {
-                    *seen = free[row] & !hidden;
-                    hidden |= *seen;
-                    starts |= *seen & !(*seen << 1);
-                }
-                let of_row = row * TILE_SIDE;
-                pen.row(starts, hidden & !starts, of_row, |at| {
-                    let value = &mut values[(of_row + at as usize) % TILE_CELLS];
-                    let laid = seen.iter().zip(&grades).find(|(seen, _)| **seen >> at & 1 == 1);
-                    laid.map_or_else(|| rounding.of(std::mem::take(value)), |(_, grade)| *grade)
-                });
-            }
-            *free = [[0; TILE_SIDE]; GRADES];
-        }
-        *marked = [0; TILE_SIDE];
-        pen.patch()
-    }
-}
-
-/// Writes runs down.
-struct Pen<'a> {
-    /// The first `count` are done; then comes the last one, which may go on.
-    runs: &'a mut [EvidenceRun; TILE_CELLS],
-    count: usize,
-    /// The last run's first cell, the one behind it, and its value.
-    start: u32,
-    end: u32,
-    value: i16,
-}
-
-impl Pen<'_> {
-    /// Writes down a row's runs: they begin at `starts` and go on as far as `goes_on`.
-    #[inline]
-    fn row(
-        &mut self,
-        mut starts: u64,
-        goes_on: u64,
-        of_row: usize,
-        mut value: impl FnMut(u32) -> i16,
-    ) {
-        while starts != 0 {
-            let at = starts.trailing_zeros();
-            starts &= starts - 1;
-            let value = value(at);
-            let length = 1 + (!(goes_on >> at >> 1)).trailing_zeros();
-            self.push(of_row as u32 + at, length, value);
-        }
-    }
-
-    /// Adds a run, to the last one if it only goes on.
-    #[inline]
-    fn push(&mut self, start: u32, length: u32, value: i16) {
-        let begins = self.value != value || self.end != start;
-        self.count += usize::from(begins && self.value != 0);
-        self.start = if begins { start } else { self.start };
-        (self.end, self.value) = (start + length, value);
-        let length = self.end - self.start;
-        self.runs[self.count % TILE_CELLS] =
-            EvidenceRun { start: self.start as u16, length: length as u16, value };
-    }
-
-    /// The runs as a patch; `None` if there are none.
-    fn patch(self) -> Option<TilePatch> {
-        let count = self.count + usize::from(self.value != 0);
-        let runs = self.runs.get(..count).filter(|runs| !runs.is_empty())?;
-        // Runs in the order of the cells are a patch.
-        TilePatch::new(runs.to_vec()).ok()
-    }
+            let laid =
+                free.iter().zip(&grades).rev().find(|(free, _)| free[row] >> column & 1 == 1);
+            laid.map_or(0, |(_, grade)| *grade)
+        });
+        *free = [[0; TILE_SIDE]; GRADES];
+        patch
+    };
+    *marked = [0; TILE_SIDE];
+    patch
 }
 
 /// How millinats become log-odds steps.
