@@ -69,7 +69,8 @@ pub(super) fn judge(
     };
     if !sonar.is_steady && applies(SonarRule::Crosstalk) {
         verdicts.note(Some(SonarRule::Crosstalk));
-        return Some(Echo { free_to: range.min(limit), free_weight: 1.0, arc: None });
+        let arc = (range <= limit).then_some((range, config.unsteady));
+        return Some(Echo { free_to: range.min(limit), free_weight: 1.0, arc });
     }
     let sure = range - config.ghost_sds * profile.range_sd(range);
     let wall = walls

@@ -9,8 +9,8 @@ pub enum SonarRule {
     TooNear,
     /// No echo: weak evidence for free space, for smooth walls are silent too.
     Silent,
-    /// It changed while the robot stood: probably another sonar's pulse. It has no arc, and frees up to
-    /// the nearest that was heard.
+    /// It changed while the robot stood: probably another sonar's pulse. Its arc, at the nearest that was
+    /// heard, counts little, and it frees up to there.
     Crosstalk,
     /// From behind a wall that is known: a detour. Its arc is refused, and it frees up to the wall only.
     Ghost,
