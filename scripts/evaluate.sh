@@ -24,5 +24,6 @@ if [ -d ../shared/data/plans ]; then "$evaluate" buildings --report BENCHMARKS.m
 "$evaluate" structures --report BENCHMARKS.md
 "$evaluate" localization --report BENCHMARKS.md
 "$evaluate" places --report BENCHMARKS.md --data ../shared/data
+"$evaluate" alignment --report BENCHMARKS.md --data ../shared/data
 "$evaluate" growth --report BENCHMARKS.md --data ../shared/data
 scripts/with-postgres.sh "$evaluate" maps --report BENCHMARKS.md --data ../shared/data "$@"

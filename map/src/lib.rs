@@ -65,8 +65,10 @@
 //! * [`gdb`]: the building as it was meant to be, cut to what a sensor would see of it.
 //! * [`changes`]: what a level's map says against a plan of the GDB.
 //! * [`places`]: where on a map a whole look fits, and nowhere else.
+//! * [`alignment`]: where on a level a whole map lies that a robot made in a frame of its own.
 //! * [`level`]: contributions, the fold, and patches between two revisions.
 
+pub mod alignment;
 #[cfg(test)]
 mod chance;
 pub mod changes;

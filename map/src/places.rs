@@ -19,6 +19,7 @@ mod weigh;
 use crate::geometry::{Level, Point, Robot, UncertainPose};
 
 pub use field::LikelihoodField;
+pub(crate) use field::{Known, STEPS, walls_of};
 pub use search::{place_near, search};
 
 /// A beam of a look that hit something, in the robot frame.

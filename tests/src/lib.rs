@@ -32,6 +32,7 @@
 //! * [`evaluation`], [`speed`], [`statistics`], [`report`]: `mapfold-evaluate`, which writes tables between markers
 //!   into a page of text.
 
+pub mod alignment;
 pub mod api;
 pub mod buildings;
 pub mod carmen;

@@ -6,8 +6,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use mapfold_tests::{
-    buildings, change, differences, evaluation, extraction, figure, growth, honesty, localization,
-    places, plans, range, raster, serving, speed, structures,
+    alignment, buildings, change, differences, evaluation, extraction, figure, growth, honesty,
+    localization, places, plans, range, raster, serving, speed, structures,
 };
 
 /// Measures Mapfold and rewrites the tables of a report between their markers.
@@ -111,6 +111,15 @@ enum Command {
         #[arg(long, value_name = "DIR")]
         data: Option<PathBuf>,
     },
+    /// Aligns maps that robots made in frames of their own, out of logs that are cut in two
+    Alignment {
+        /// The page with the markers `alignment`
+        #[arg(long, value_name = "FILE")]
+        report: PathBuf,
+        /// A folder with further logs, in `logs/`
+        #[arg(long, value_name = "DIR")]
+        data: Option<PathBuf>,
+    },
     /// Draws a hallway's vector map from a few scans of the committed log
     Figure {
         /// The SVG to write
@@ -166,6 +175,7 @@ async fn main() -> ExitCode {
         Command::Structures { report } => structures::table(&report),
         Command::Localization { report } => localization::tables(&report),
         Command::Places { report, data } => places::table(&report, data.as_deref()),
+        Command::Alignment { report, data } => alignment::table(&report, data.as_deref()),
         Command::Figure { out } => figure::write(&out).await.map(|()| Vec::new()),
         Command::Raster { report, picture } => raster::raster(&report, &picture),
         Command::Benches { report, criterion } => speed::benches(&report, &criterion),

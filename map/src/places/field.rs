@@ -11,13 +11,13 @@ use crate::raster::{
 use crate::vector::Facing;
 
 /// Steps of a nat in which fits are counted.
-pub(super) const STEPS: f64 = 20.0;
+pub(crate) const STEPS: f64 = 20.0;
 /// Most cells of the search: beyond, they are made larger.
 const CELLS_MAX: usize = 32_000_000;
 
 /// What is known of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Known {
+pub(crate) enum Known {
     Nothing,
     Free,
     Occupied,
@@ -37,7 +37,7 @@ pub struct LikelihoodField {
     fits: Vec<u8>,
     known: Vec<Known>,
     /// The best fit.
-    pub(super) best: u8,
+    pub(crate) best: u8,
     pub(super) search: SearchField,
 }
 
@@ -77,15 +77,7 @@ impl LikelihoodField {
             .together()
         };
         let tiles = places.into_iter().filter_map(|tile| Some((tile, together(tile)?)));
-        let walls = map.segments.values().flat_map(|segment| {
-            segment.solid.iter().map(|part| {
-                let ends = (segment.line.at(part.span.from_m()), segment.line.at(part.span.to_m()));
-                match segment.facing {
-                    Facing::Origin => ends,
-                    Facing::Away => (ends.1, ends.0),
-                }
-            })
-        });
+        let walls = walls_of(map);
         Self::new(tiles, walls, resolution, config)
     }
 
@@ -183,6 +175,21 @@ impl LikelihoodField {
         Some(slot as usize * TILE_CELLS + (y % side * side + x % side) as usize)
     }
 
+    /// All cells that are kept, by their centres, with what is known of them.
+    pub(crate) fn cells(&self) -> impl Iterator<Item = (Point, Known)> + use<'_> {
+        let kept = self.slots.iter().enumerate();
+        let kept = kept.filter_map(|(tile, slot)| Some((tile, slot.checked_sub(1)?)));
+        kept.flat_map(move |(tile, slot)| {
+            let index = TileIndex {
+                x: self.low.x + (tile % self.columns) as i32,
+                y: self.low.y + (tile / self.columns) as i32,
+            };
+            let known = &self.known[slot as usize * TILE_CELLS..][..TILE_CELLS];
+            let centre = move |offset| index.cell(offset).centre(self.resolution);
+            known.iter().enumerate().map(move |(offset, known)| (centre(offset), *known))
+        })
+    }
+
     fn index_of(&self, p: &Point) -> Option<usize> {
         let side = TILE_SIDE as i64;
         let x = (p.x / self.resolution).floor() as i64 - i64::from(self.low.x) * side;
@@ -191,13 +198,13 @@ impl LikelihoodField {
     }
 
     /// How well a beam that ends there fits, in steps above the worst.
-    pub(super) fn fit(&self, p: &Point) -> u8 {
+    pub(crate) fn fit(&self, p: &Point) -> u8 {
         let unknown = || fit(Known::Nothing, self.best, &self.config);
         self.index_of(p).map_or_else(unknown, |at| self.fits[at])
     }
 
     /// What is known of a place.
-    pub(super) fn known(&self, p: &Point) -> Known {
+    pub(crate) fn known(&self, p: &Point) -> Known {
         self.index_of(p).map_or(Known::Nothing, |at| self.known[at])
     }
 
@@ -254,6 +261,19 @@ impl LikelihoodField {
         let area = self.search.free_count as f64 * self.search.cell * self.search.cell;
         (area / (apart * apart) * std::f64::consts::TAU / turned).max(1.0).ln()
     }
+}
+
+/// The walls of a map, part by part, each from end to end with free space on the left.
+pub(crate) fn walls_of(map: &LevelMap) -> impl Iterator<Item = (Point, Point)> + use<'_> {
+    map.segments.values().flat_map(|segment| {
+        segment.solid.iter().map(|part| {
+            let ends = (segment.line.at(part.span.from_m()), segment.line.at(part.span.to_m()));
+            match segment.facing {
+                Facing::Origin => ends,
+                Facing::Away => (ends.1, ends.0),
+            }
+        })
+    })
 }
 
 fn of_evidence(evidence: LogOdds, config: &PlacesConfig) -> Known {

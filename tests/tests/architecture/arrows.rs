@@ -71,6 +71,7 @@ const MODULES: &[(&str, &[ModuleRule])] = &[
             ),
             ("level", &["geometry", "raster", "vector"]),
             ("changes", &["gdb", "geometry", "level", "raster", "vector"]),
+            ("alignment", &["geometry", "landmarks", "level", "places", "raster", "vector"]),
             ("places", &["geometry", "level", "raster", "vector"]),
         ],
     ),
