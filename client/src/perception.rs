@@ -21,6 +21,7 @@ pub mod fit;
 mod guess;
 pub mod hedge;
 mod incidence;
+mod percept;
 pub mod plausibility;
 pub mod points;
 pub mod seen_through;
@@ -45,6 +46,7 @@ use segment::Mount;
 use split::{FoundLine, Splitter};
 
 pub use correction::{Corrected, Corrector};
+pub use percept::{Percept, Perception};
 pub use plausibility::BeamState;
 
 /// Every setting of extraction, one struct an algorithm.

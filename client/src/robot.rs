@@ -26,7 +26,7 @@ pub use crate::evidence::{KnownWalls, SonarVerdicts};
 use crate::emulation::EmulationConfig;
 use crate::evidence::{Canvas, ScannerEvidenceConfig, SonarEvidenceConfig};
 use crate::log::{Observation, Reading};
-use crate::perception::Extractor;
+use crate::perception::Perception;
 use crate::sensor::{ScannerProfile, Sensors, SonarProfile};
 
 /// Where a robot takes its poses from.
@@ -133,7 +133,7 @@ pub struct Surveyor {
 #[derive(Debug)]
 struct Scanner {
     profile: ScannerProfile,
-    extractor: Extractor,
+    perception: Perception,
     evidence: ScannerEvidenceConfig,
 }
 
@@ -158,7 +158,7 @@ impl Surveyor {
             reckoning: DeadReckoning::new(config.odometry),
             scanner: scanner.map(|profile| {
                 Box::new(Scanner {
-                    extractor: Extractor::for_scanner(&profile),
+                    perception: Perception::for_scanner(&profile),
                     evidence: ScannerEvidenceConfig::STANDARD,
                     profile,
                 })

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use mapfold_client::localization::{Fix, Seeker, SeekerConfig, view};
 use mapfold_client::log::{Log, Observation, carmen};
-use mapfold_client::perception::Extractor;
+use mapfold_client::perception::Perception;
 use mapfold_client::replay::SensorChoice;
 use mapfold_client::robot::{OdometryNoise, PoseSd, PoseSource, Surveyor, SurveyorConfig};
 use mapfold_map::geometry::{Level as LevelFrame, Odom, Pose, Robot, difference};
@@ -68,15 +68,14 @@ fn looks(path: &Path) -> Result<Vec<Look>, Error> {
         source: log.digest,
     };
     let mut surveyor = Surveyor::new(config, 0).map_err(|e| fault(e.to_string()))?;
-    let mut extractor = Extractor::for_scanner(&profile);
+    let mut perception = Perception::for_scanner(&profile);
     let mut looks = Vec::new();
     for reading in &log.readings {
         let Observation::Scan(scan) = &reading.observation else { continue };
         let Ok(look) = surveyor.survey(reading) else { continue };
-        let features = extractor.extract(scan).clone();
         looks.push(Look {
             contribution: look.contribution,
-            view: view(scan, extractor.states(), &features, &PlacesConfig::STANDARD),
+            view: view(&perception.of(scan), &PlacesConfig::STANDARD),
             odom_from_robot: reading.odom_from_robot,
         });
     }

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use mapfold_client::geojson::{PlacedFeatures, feature_collection};
 use mapfold_client::log::{Observation, carmen};
-use mapfold_client::perception::{BeamUse, Extractor, Features};
+use mapfold_client::perception::{BeamUse, Features, Perception};
 use mapfold_client::replay::{Competence, SensorChoice};
 use mapfold_client::sensor::Sensors;
 
@@ -40,7 +40,7 @@ impl Extract {
             emulate_sonar: false,
         };
         let scanner = choice.choose(&log)?.scanner.ok_or("there is no profile of the scanner")?;
-        let mut extractor = Extractor::for_scanner(&scanner);
+        let mut perception = Perception::for_scanner(&scanner);
         let mut found: Vec<(u32, f64, _, Features)> = Vec::new();
         let mut count = 0;
         for reading in &log.readings {
@@ -48,7 +48,8 @@ impl Extract {
             let wanted = self.scan.is_none_or(|n| n == count);
             count += 1;
             if let (true, Some(pose)) = (wanted, reading.level_from_robot) {
-                found.push((reading.index, reading.time_s, pose, extractor.extract(scan).clone()));
+                let features = perception.of(scan).features.clone();
+                found.push((reading.index, reading.time_s, pose, features));
             }
         }
         if found.is_empty() {

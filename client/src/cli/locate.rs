@@ -9,7 +9,7 @@ use mapfold_client::localization::{
     Candidate, Fix, KnownLevel, Localized, Localizer, LocalizerConfig, Seeker, view,
 };
 use mapfold_client::log::{Log, Observation, Reading, carmen};
-use mapfold_client::perception::Extractor;
+use mapfold_client::perception::Perception;
 use mapfold_client::replay::{Competence, SensorChoice};
 use mapfold_client::sensor::{Scan, Sensors};
 use mapfold_client::sync::{Mirror, MirrorConfig};
@@ -55,11 +55,11 @@ impl Locate {
         let scanner = choice.choose(&log)?.scanner.ok_or("there is no profile of the scanner")?;
         let config = LocalizerConfig::STANDARD;
         let known = self.known(&config).await?;
-        let mut extractor = Extractor::for_scanner(&scanner);
+        let mut perception = Perception::for_scanner(&scanner);
         let outcome = if self.track {
-            track(&log, &known, &mut extractor, &config)
+            track(&log, &known, &mut perception, &config)
         } else {
-            self.each(&log, &known, &mut extractor, &config)
+            self.each(&log, &known, &mut perception, &config)
         };
         let counts = outcome?;
         say(&counts.in_words());
@@ -100,14 +100,13 @@ impl Locate {
         &self,
         log: &Log,
         known: &KnownLevel,
-        extractor: &mut Extractor,
+        perception: &mut Perception,
         config: &LocalizerConfig,
     ) -> Result<Counts, Box<dyn std::error::Error>> {
         let mut counts = Counts::default();
         let scans = scans(log).enumerate().filter(|(n, _)| self.scan.is_none_or(|only| only == *n));
         for (_, (reading, scan)) in scans {
-            let features = extractor.extract(scan).clone();
-            let view = view(scan, extractor.states(), &features, &config.places);
+            let view = view(&perception.of(scan), &config.places);
             let mut seeker = Seeker::new(config.seeker, config.places);
             let fix = seeker.seen(&known.field, &view, &[]);
             counts.count(&fix);
@@ -128,7 +127,7 @@ impl Locate {
 fn track(
     log: &Log,
     known: &KnownLevel,
-    extractor: &mut Extractor,
+    perception: &mut Perception,
     config: &LocalizerConfig,
 ) -> Result<Counts, Box<dyn std::error::Error>> {
     let mut counts = Counts::default();
@@ -140,9 +139,9 @@ fn track(
             localizer.moved(&last.inverse().compose(&odom_from_robot));
         }
         last = Some(odom_from_robot);
-        let features = extractor.extract(scan).clone();
-        let view = view(scan, extractor.states(), &features, &config.places);
-        match localizer.seen(&view, &features.segments, known) {
+        let percept = perception.of(scan);
+        let view = view(&percept, &config.places);
+        match localizer.seen(&view, &percept.features.segments, known) {
             Localized::Tracked(pose, report) => {
                 counts.scans += 1;
                 counts.tracked += 1;

@@ -4,14 +4,14 @@ use mapfold_map::geometry::{Point, unit_normal};
 use mapfold_map::places::{Beam, PlacesConfig, View};
 use mapfold_map::vector::{Facing, ObservedSegment};
 
-use crate::perception::{BeamState, BeamUse, Features};
-use crate::sensor::Scan;
+use crate::perception::{BeamState, BeamUse, Percept};
 
 /// Shorter walls tell no direction, metres.
 const WALL_MIN_M: f64 = 0.5;
 
-/// The view of a scan with the features and the states of its beams that perception made of it.
-pub fn view(scan: &Scan, states: &[BeamState], features: &Features, config: &PlacesConfig) -> View {
+/// The view of what perception made of a scan.
+pub fn view(percept: &Percept<'_>, config: &PlacesConfig) -> View {
+    let Percept { scan, states, features } = *percept;
     let mut view =
         View { walls: features.segments.iter().filter_map(wall).collect(), ..View::default() };
     let from = scan.robot_from_sensor.position();

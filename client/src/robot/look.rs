@@ -9,8 +9,8 @@ use super::{Scanner, Surveyor};
 use crate::emulation::{self, Chance};
 use crate::evidence::{KnownWalls, SonarVerdicts, scanner_evidence, sonar_evidence};
 use crate::log::{Observation, Reading};
-use crate::perception::BeamState;
-use crate::sensor::{MountedAt, Ring, Scan};
+use crate::perception::{BeamState, Percept};
+use crate::sensor::{Ring, Scan};
 
 /// One contribution before it is sent.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,13 +58,10 @@ pub(super) fn fill(
 /// Walls, clusters and evidence of a scan.
 fn see(surveyor: &mut Surveyor, scan: &Scan, look: &mut Contribution) {
     let Some(scanner) = &mut surveyor.scanner else { return };
-    let Scanner { profile, extractor, evidence } = scanner.as_mut();
-    let mounted = mounted(scan, &profile.mount);
-    let scan = mounted.as_ref().unwrap_or(scan);
-    let features = extractor.extract(scan);
+    let Scanner { profile, perception, evidence } = scanner.as_mut();
+    let Percept { scan, states, features } = perception.of(scan);
     look.segments.clone_from(&features.segments);
     look.clusters.clone_from(&features.clusters);
-    let (scan, states) = (extractor.corrected_scan().unwrap_or(scan), extractor.states());
     let usable = |beam: usize| states.get(beam).is_some_and(|state| *state == BeamState::Hit);
     let patch = scanner_evidence(
         scan,
@@ -76,14 +73,6 @@ fn see(surveyor: &mut Surveyor, scan: &Scan, look: &mut Contribution) {
         &mut surveyor.canvas,
     );
     look.evidence.extend((!patch.tiles.is_empty()).then_some(patch));
-}
-
-/// The scan with the profile's mount, if the log told none.
-fn mounted(scan: &Scan, mount: &MountedAt) -> Option<Scan> {
-    let told = &scan.robot_from_sensor;
-    let untold = told.x == 0.0 && told.y == 0.0 && told.heading() == 0.0;
-    (untold && *mount != MountedAt::default())
-        .then(|| Scan { robot_from_sensor: mount.robot_from_sensor(), ..scan.clone() })
 }
 
 /// Evidence of a ring.

@@ -9,6 +9,8 @@ use mapfold_schema::border::{Violation, check_correction};
 use mapfold_schema::v1;
 use serde::{Deserialize, Serialize};
 
+use super::Scan;
+
 /// Where a sensor sits on the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Default)]
 #[serde(deny_unknown_fields)]
@@ -25,6 +27,14 @@ impl MountedAt {
     /// As a pose.
     pub fn robot_from_sensor(&self) -> Pose<Robot, Sensor> {
         Pose::new(self.x_m, self.y_m, self.heading_rad)
+    }
+
+    /// The scan as taken from here, if the log did not tell where its sensor sits and this does.
+    pub fn placed(&self, scan: &Scan) -> Option<Scan> {
+        let told = &scan.robot_from_sensor;
+        let untold = told.x == 0.0 && told.y == 0.0 && told.heading() == 0.0;
+        (untold && *self != Self::default())
+            .then(|| Scan { robot_from_sensor: self.robot_from_sensor(), ..scan.clone() })
     }
 
     fn to_wire(self) -> v1::SensorMount {
