@@ -3,7 +3,7 @@
 # holds them against the walls; scores grids of sonars and scanners and draws a corridor; compares what the
 # maps of simulated fleets claim with truth; moves shelves; removes, adds and moves
 # things and asks what is told of it against the model; takes real buildings in; cuts vast models; times what a server answers about vast rasters; asks
-# for places among landmarks; tracks robots and carries some away; lets lost ones find their places on logs; times the
+# for places among landmarks; tracks robots and carries some away; lets lost ones find their places on logs, and others keep theirs on maps that another robot made; times the
 # fold of vast floors; replays every log there is through real servers on SQLite and PostgreSQL and
 # measures the maps; and rewrites the tables in BENCHMARKS.md. Logs and plans that may not be committed
 # are looked for in ../shared/data; without that folder: the committed logs and simulated worlds.
@@ -25,5 +25,6 @@ if [ -d ../shared/data/plans ]; then "$evaluate" buildings --report BENCHMARKS.m
 "$evaluate" localization --report BENCHMARKS.md
 "$evaluate" places --report BENCHMARKS.md --data ../shared/data
 "$evaluate" alignment --report BENCHMARKS.md --data ../shared/data
+if [ -d ../shared/data/logs ]; then "$evaluate" trajectories --report BENCHMARKS.md --data ../shared/data; fi
 "$evaluate" growth --report BENCHMARKS.md --data ../shared/data
 scripts/with-postgres.sh "$evaluate" maps --report BENCHMARKS.md --data ../shared/data "$@"

@@ -62,7 +62,7 @@ pub(crate) async fn run(arguments: Arguments, rng: StdRng) -> ExitCode {
 
 async fn dispatch(command: Command, rng: StdRng) -> Result<ExitCode, Box<dyn std::error::Error>> {
     match command {
-        Command::Replay(replay) => replay.run(rng).await,
+        Command::Replay(replay) => Box::pin(replay.run(rng)).await,
         Command::Extract(extract) => extract.run(),
         Command::Locate(locate) => locate.run().await,
         Command::Mirror(mirror) => mirror.run(rng).await,

@@ -10,6 +10,7 @@
 //! * [`evidence`]: from a scan or a ring of sonars to evidence for the grid.
 //! * [`emulation`]: a ring of sonars out of a scanner, for demonstrations.
 //! * [`geojson`]: features of scans, for looking at.
+//! * `odometry`: what the wheels count, and how it loses its certainty.
 //! * [`robot`]: the surveyor, which makes contributions of readings.
 //! * [`localization`]: where the robot is while it drives.
 //! * [`sync`]: the outbox, the upload, the mirror of the shared map.
@@ -20,6 +21,7 @@ pub mod evidence;
 pub mod geojson;
 pub mod localization;
 pub mod log;
+mod odometry;
 pub mod perception;
 pub mod replay;
 pub mod robot;

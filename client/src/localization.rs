@@ -32,6 +32,7 @@
 //!
 //! Knows no server.
 
+mod drift;
 mod filter;
 mod landmarks;
 mod lines;
@@ -45,8 +46,11 @@ mod tracker;
 mod view;
 mod watchdog;
 
+pub use drift::DriftConfig;
 pub use filter::WallName;
-pub use localizer::{KnownLevel, Localized, Localizer, LocalizerConfig};
+pub use localizer::{
+    CheckConfig, KnownLevel, Localized, Localizer, LocalizerConfig, NOTHING_KNOWN,
+};
 pub use reference_walls::{ReferenceWalls, ReferenceWallsConfig};
 pub use seeker::{Candidate, Fix, Seeker, SeekerConfig};
 pub use tracker::{TrackReport, Tracker, TrackerConfig};

@@ -10,6 +10,7 @@
 mod enrolment;
 mod producer;
 mod report;
+mod reporter;
 mod sensors;
 mod window;
 
@@ -23,10 +24,12 @@ use rand::Rng;
 use tokio::sync::watch;
 use tokio::time::Instant;
 
+use crate::localization::{KnownLevel, LocalizerConfig, NOTHING_KNOWN};
 use crate::log::carmen;
 use crate::robot::at_rest::{self, AtRestConfig};
 use crate::robot::{
     MappedWalls, OdometryNoise, PoseSd, PoseSource, Surveyor, SurveyorConfig, SurveyorError,
+    Whereabouts,
 };
 use crate::sensor::Sensors;
 use crate::sync::{
@@ -39,7 +42,7 @@ pub use report::Report;
 pub use sensors::{Competence, SensorChoice, SensorsError};
 pub use window::{Cut, CutError, Window};
 
-use producer::Producer;
+use producer::{Ground, Producer};
 
 /// What to play, and how.
 #[derive(Debug, Clone)]
@@ -69,7 +72,8 @@ pub struct ReplayOptions {
     /// The outbox's folder; one of its own for robot and level under `./mapfold-robot-data` if absent.
     pub outbox: Option<PathBuf>,
     /// The folder of a mirror, which is brought up to date first: its walls then tell which echoes of sonars are
-    /// ghosts. Nothing is known beforehand if absent.
+    /// ghosts, and a robot that localizes itself does so on it. If absent, nothing is known beforehand, or one of
+    /// its own under `./mapfold-robot-data` is localized on.
     pub mirror: Option<PathBuf>,
     /// How to upload.
     pub upload: UploadConfig,
@@ -153,6 +157,14 @@ pub enum ReplayError {
         /// What was asked for, metres.
         wanted_m: f64,
     },
+    /// A robot cannot find itself on a level of which nothing is known.
+    #[error(
+        "level {level} {NOTHING_KNOWN}: play this robot with other poses, or another robot first"
+    )]
+    NothingKnown {
+        /// Which level.
+        level: LevelAddress,
+    },
     /// The speed is no speed.
     #[error("a speed of {0} is none: it must be more than 0")]
     Speed(f64),
@@ -223,16 +235,34 @@ pub async fn run(
         tracing::warn!(?reconciled, "the server was set back to an older state; sending again");
     }
 
-    let walls = match &options.mirror {
-        Some(folder) => Some(mapped_walls(folder.clone(), &options.level, &api).await?),
-        None => None,
-    };
-    let surveyor = Surveyor::new(config(level.resolution_m), first)?;
+    let mut surveyor = Surveyor::new(config(level.resolution_m), first)?;
+    let mut walls = None;
+    if let Some(mirror) = mirror(&options, &api).await? {
+        walls = Some(MappedWalls::of(mirror.map()));
+        if options.poses == PoseSource::Localize {
+            let whereabouts = whereabouts(mirror, &options.level).await?;
+            surveyor = surveyor.localize_on(whereabouts);
+        }
+    }
     let of_log = log.summary.clone();
-    let producer = Producer::new(log, numbers, surveyor, walls, level.frame, Arc::clone(&outbox));
+    let (tell, fixes) = watch::channel(None);
+    let revision = surveyor.whereabouts().map_or(0, |whereabouts| whereabouts.basis().revision);
+    let producer = Producer::new(
+        log,
+        numbers,
+        surveyor,
+        walls,
+        Ground { frame: level.frame, level: options.level.level.clone() },
+        Arc::clone(&outbox),
+        tell,
+    );
     let uploader =
         Uploader::new(api.clone(), Arc::clone(&outbox), options.level.clone(), options.upload);
-    let (surveyed, summary) = play(producer, &uploader, options.speed, &mut rng, progress).await?;
+    let ((), played) = tokio::join!(
+        reporter::report(&api, &options.level, &options.robot, revision, fixes),
+        play(producer, &uploader, options.speed, &mut rng, progress),
+    );
+    let (surveyed, summary) = played?;
     let report = Report::new(&options, &of_log, &surveyed, &summary, started.elapsed());
     if surveyed.placed == 0 && report.trouble.is_none() {
         return Err(ReplayError::NothingPlaced(surveyed.why_nothing()));
@@ -240,25 +270,32 @@ pub async fn run(
     Ok(report)
 }
 
-/// The walls of the level as they are now or, if the server cannot be reached, as the mirror in this folder
-/// has them since it last could.
-async fn mapped_walls(
-    folder: PathBuf,
-    level: &LevelAddress,
-    api: &Api,
-) -> Result<MappedWalls, ReplayError> {
-    let of_level = level.clone();
-    let open = move || Mirror::open(&folder, &of_level, MirrorConfig::STANDARD);
+/// The level as it is now or, if the server cannot be reached, as its mirror has it since it last could. `None` if
+/// the robot needs none.
+async fn mirror(options: &ReplayOptions, api: &Api) -> Result<Option<Mirror>, ReplayError> {
+    let is_needed = options.poses == PoseSource::Localize;
+    let default = || is_needed.then(|| Mirror::default_folder(&options.level));
+    let Some(folder) = options.mirror.clone().or_else(default) else { return Ok(None) };
+    let level = options.level.clone();
+    let open = move || Mirror::open(&folder, &level, MirrorConfig::STANDARD);
     let mut mirror = worker(open).await??;
-    match mirror.refresh(api).await {
-        Err(error) if error.is_retryable() && mirror.frame().is_some() => {
-            tracing::warn!(%error, revision = mirror.revision(), "walls are taken from the mirror as it was");
-        }
-        outcome => {
-            outcome?;
-        }
+    if let Some(error) = mirror.refresh_if_reachable(api).await? {
+        tracing::warn!(%error, revision = mirror.revision(), "the map is taken from the mirror as it was");
     }
-    Ok(MappedWalls::of(mirror.map()))
+    Ok(Some(mirror))
+}
+
+/// What a robot is localized by that has this mirror.
+async fn whereabouts(mirror: Mirror, level: &LevelAddress) -> Result<Whereabouts, ReplayError> {
+    let level = level.clone();
+    worker(move || {
+        let config = LocalizerConfig::STANDARD;
+        let resolution_m = mirror.resolution_m().unwrap_or_default();
+        let known = KnownLevel::of_map(mirror.map(), resolution_m, &config)
+            .ok_or(ReplayError::NothingKnown { level })?;
+        Ok(Whereabouts::new(known, mirror.revision(), config))
+    })
+    .await?
 }
 
 /// Surveys and uploads side by side until both are done, or the upload cannot go on.

@@ -8,20 +8,23 @@ pub mod at_rest;
 mod identity;
 mod look;
 mod mapped_walls;
-mod odometry;
+mod probation;
+mod whereabouts;
 
 use std::sync::Arc;
 
-use mapfold_map::geometry::{Covariance, Level, Pose, Robot, UncertainPose};
+use mapfold_map::geometry::{Covariance, Level, Odom, Pose, Robot, UncertainPose};
 use mapfold_map::level::{Contribution, ContributionId, Provenance};
 use mapfold_schema::v1;
 
 pub use identity::Identity;
 pub use look::Look;
 pub use mapped_walls::MappedWalls;
-pub use odometry::{DeadReckoning, OdometryNoise};
+pub use probation::Probation;
+pub use whereabouts::{Basis, Whereabouts};
 
 pub use crate::evidence::{KnownWalls, SonarVerdicts};
+pub use crate::odometry::{DeadReckoning, OdometryNoise};
 
 use crate::emulation::EmulationConfig;
 use crate::evidence::{Canvas, ScannerEvidenceConfig, SonarEvidenceConfig};
@@ -37,6 +40,9 @@ pub enum PoseSource {
     Log,
     /// Dead reckoning from the first of them on.
     Odometry,
+    /// Found on the map that the robot has, then tracked ([`Surveyor::localize_on`]). A robot without a scanner cannot
+    /// find its place: it starts at the log's first pose.
+    Localize,
 }
 
 /// Standard deviations of a pose that comes without any.
@@ -87,6 +93,21 @@ pub struct SurveyorConfig {
     pub source: [u8; 32],
 }
 
+impl SurveyorConfig {
+    /// Where the robot starts that has to be told: where the log says, or else at the origin of its wheels' frame.
+    fn start(
+        &self,
+        reading: &Reading,
+        odom_from_robot: &Pose<Odom, Robot>,
+    ) -> UncertainPose<Level, Robot> {
+        let pose = reading.level_from_robot.unwrap_or_else(|| {
+            let p = odom_from_robot;
+            Pose::new(p.x, p.y, p.heading())
+        });
+        UncertainPose { pose, covariance: self.pose_sd.covariance() }
+    }
+}
+
 /// Settings that cannot work.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SurveyorError {
@@ -109,6 +130,12 @@ pub enum Passed {
     NoOdometry,
     /// Dead reckoning for so long that its covariance says nothing any more.
     Lost,
+    /// Localization, and no map to localize on.
+    NoMap,
+    /// Before the robot had found its place, or while it was lost.
+    Unplaced,
+    /// Placed, but its map does not show there what it saw, or it turned out shortly afterwards that it was lost.
+    Doubted,
 }
 
 /// A heading that is less certain than this is lost, radians: from half a radian on, first-order
@@ -122,6 +149,7 @@ pub struct Surveyor {
     robot: Arc<str>,
     identity: Identity,
     reckoning: DeadReckoning,
+    whereabouts: Option<Box<Whereabouts>>,
     /// Apart, for what it keeps to work in is large.
     scanner: Option<Box<Scanner>>,
     sonar: Option<SonarProfile>,
@@ -156,6 +184,7 @@ impl Surveyor {
             robot: Arc::from(config.robot.as_str()),
             identity: Identity::new(&config, first),
             reckoning: DeadReckoning::new(config.odometry),
+            whereabouts: None,
             scanner: scanner.map(|profile| {
                 Box::new(Scanner {
                     perception: Perception::for_scanner(&profile),
@@ -169,6 +198,17 @@ impl Surveyor {
             canvas: Canvas::default(),
             config,
         })
+    }
+
+    /// The surveyor of a robot that finds its place itself, by this.
+    #[must_use]
+    pub fn localize_on(self, whereabouts: Whereabouts) -> Self {
+        Self { whereabouts: Some(Box::new(whereabouts)), ..self }
+    }
+
+    /// What the robot knows of its place, if it finds it itself.
+    pub fn whereabouts(&self) -> Option<&Whereabouts> {
+        self.whereabouts.as_deref()
     }
 
     /// The sensors in use, as the robot declares them to the server.
@@ -203,16 +243,33 @@ impl Surveyor {
             }
             PoseSource::Odometry => {
                 let odom_from_robot = reading.odom_from_robot.ok_or(Passed::NoOdometry)?;
-                let start = || {
-                    let pose = reading.level_from_robot.unwrap_or_else(|| {
-                        let p = &odom_from_robot;
-                        Pose::new(p.x, p.y, p.heading())
-                    });
-                    UncertainPose { pose, covariance: self.config.pose_sd.covariance() }
-                };
+                let start = || self.config.start(reading, &odom_from_robot);
                 let pose = self.reckoning.carry_on(odom_from_robot, start);
                 if pose.covariance.sd(2) > LOST_HEADING_SD { Err(Passed::Lost) } else { Ok(pose) }
             }
+            PoseSource::Localize => self.find(reading),
+        }
+    }
+
+    /// Where the robot is by its map and its wheels.
+    fn find(&mut self, reading: &Reading) -> Result<UncertainPose<Level, Robot>, Passed> {
+        let ring = look::ring(self, reading);
+        let whereabouts = self.whereabouts.as_mut().ok_or(Passed::NoMap)?;
+        let odom_from_robot = reading.odom_from_robot.ok_or(Passed::NoOdometry)?;
+        whereabouts.moved_to(odom_from_robot);
+        match (&mut self.scanner, &reading.observation, ring, &self.sonar) {
+            (Some(scanner), Observation::Scan(scan), ..) => {
+                whereabouts.seen(&scanner.perception.of(scan))
+            }
+            // What the scanner says is far better than what the ring could add.
+            (Some(_), ..) => whereabouts.carried(),
+            (None, _, Some(ring), Some(sonar)) => {
+                if !whereabouts.has_begun() {
+                    whereabouts.told(self.config.start(reading, &odom_from_robot));
+                }
+                whereabouts.heard(&ring, sonar)
+            }
+            (None, ..) => Err(Passed::OtherSensor),
         }
     }
 
@@ -240,13 +297,15 @@ impl Surveyor {
             provenance: match self.config.poses {
                 PoseSource::Log => self.config.provenance,
                 PoseSource::Odometry => Provenance::Odometry,
+                PoseSource::Localize => Provenance::SharedMap,
             },
             segments: Vec::new(),
             clusters: Vec::new(),
             evidence: Vec::new(),
         };
         let sonar = look::fill(self, reading, walls, &mut contribution);
-        Look { contribution, emulated: self.emulation.is_some(), sonar }
+        let basis = self.whereabouts.as_ref().map(|whereabouts| whereabouts.basis().clone());
+        Look { contribution, emulated: self.emulation.is_some(), basis, sonar }
     }
 
     /// [`Self::locate`] and [`Self::observe`] in one.

@@ -20,7 +20,7 @@ use crate::geometry::{Level, Point, Robot, UncertainPose};
 
 pub use field::LikelihoodField;
 pub(crate) use field::{Known, STEPS, walls_of};
-pub use search::{place_near, search};
+pub use search::{place_near, search, search_near};
 
 /// A beam of a look that hit something, in the robot frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -134,6 +134,15 @@ pub struct Place {
     pub hits: f64,
     /// Share of the beams that pass through what is known to be occupied.
     pub throughs: f64,
+    /// Beams that were weighed.
+    pub beams: usize,
+}
+
+impl Place {
+    /// How much better a beam fits here than at a place that is not on the map, on average, nat.
+    pub fn gain(&self) -> f64 {
+        self.fit / self.beams.max(1) as f64
+    }
 }
 
 /// What a search came to.

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use mapfold_map::geometry::{Level, Point, Pose, Robot, difference};
-use mapfold_map::places::{Beam, LikelihoodField, PlacesConfig, View, search};
+use mapfold_map::places::{Beam, LikelihoodField, PlacesConfig, View, search, search_near};
 use mapfold_map::raster::{Cell, TILE_CELLS, Tile, TileIndex};
 
 const RESOLUTION: f64 = 0.05;
@@ -111,6 +111,29 @@ fn of_two_equal_rooms_both_are_told_and_proposals_change_nothing() {
     let wrong = Pose::new(3.0, 1.0, 2.0);
     let helped = search(&field, &view, &[twin, wrong]);
     assert_eq!(helped.places.len(), found.places.len());
+}
+
+#[test]
+fn around_a_known_pose_only_what_is_near_is_told() {
+    let floor = [angled(0.0), angled(20.0)].concat();
+    let field = field(&floor);
+    let truth = Pose::new(1.2, 4.0, 0.7);
+    let view = view(&floor, &truth);
+    // Wheels have slipped; the twin room is out of reach.
+    for (x, y, turn) in [(0.0, 0.0, 0.0), (0.35, -0.3, 0.2), (-0.3, 0.35, -0.23)] {
+        let around = Pose::new(truth.x + x, truth.y + y, truth.heading() + turn);
+        let found = search_near(&field, &view, &around, (0.4, 0.25));
+        let [place] = found.places.as_slice() else { panic!("{found:?}") };
+        assert!(is_at(&place.level_from_robot.pose, &truth), "{place:?}");
+        assert!(found.rest < place.fit - 6.9 && place.gain() > 0.3, "{found:?}");
+    }
+    // The robot is elsewhere: nothing near fits.
+    let away = Pose::new(5.5, 1.5, 0.7);
+    let found = search_near(&field, &view, &away, (0.4, 0.25));
+    assert!(found.places.is_empty(), "{found:?}");
+    // Off the map there is nothing, and no harm.
+    let nowhere = search_near(&field, &view, &Pose::new(-900.0, 1e6, 0.0), (0.4, 0.25));
+    assert!(nowhere.places.is_empty(), "{nowhere:?}");
 }
 
 #[test]

@@ -43,6 +43,12 @@ pub fn valid(id: Uuid, robot: &str, target: &Target) -> v1::Contribution {
             heading_rad: 0.5,
             covariance: [[0.01, 0.001, 0.0], [0.001, 0.02, 0.0], [0.0, 0.0, 0.001]],
             provenance: v1::Provenance::SharedMap,
+            basis: Some(v1::FixBasis {
+                revision: 7,
+                way_m: 12.5,
+                segments: vec!["019d0000-0000-7000-8000-000000000000-3".to_owned()],
+                landmarks_m: vec![[2.5, -1.0]],
+            }),
         },
         segments: vec![v1::ObservedSegment {
             rho_m: 2.0,

@@ -24,8 +24,8 @@ mod token;
 pub use building::{BuildingImport, BuildingReport};
 pub use contribution::{
     Contribution, ContributionEntry, ContributionPage, ContributionRecord, ContributionState,
-    EvidencePatch, ObservedCluster, ObservedEnd, ObservedSegment, PoseEstimate, Provenance,
-    TilePatch,
+    EvidencePatch, FixBasis, ObservedCluster, ObservedEnd, ObservedSegment, PoseEstimate,
+    Provenance, TilePatch,
 };
 pub use event::LevelEvent;
 pub use features::{
@@ -62,7 +62,9 @@ pub use revert::{
     ChangeCounts, ChangeKind, ChangedFeature, FeatureKind, NewRevert, Revert, RevertPage,
     RevertPreview, RevertRecord, RobotShare, Undone,
 };
-pub use robot::{LastPose, NewRobot, RobotDescription, RobotState, RobotUpdate};
+pub use robot::{
+    FixKind, FixPlace, LastPose, NewRobot, RobotDescription, RobotFix, RobotState, RobotUpdate,
+};
 pub use sensor::{RangeCorrection, SensorKind, SensorMount, SensorProfile};
 pub use session::{NewSession, SessionDescription};
 pub use site::{NewSite, SiteDescription};

@@ -25,6 +25,10 @@ fn fractions(c: &mut v1::Contribution) -> Vec<&mut f64> {
     let pose = &mut c.pose;
     let mut all = vec![&mut pose.x_m, &mut pose.y_m, &mut pose.heading_rad];
     all.extend(pose.covariance.as_flattened_mut());
+    if let Some(basis) = &mut pose.basis {
+        all.push(&mut basis.way_m);
+        all.extend(basis.landmarks_m.as_flattened_mut());
+    }
     for s in &mut c.segments {
         all.extend([&mut s.rho_m, &mut s.alpha_rad, &mut s.from_m, &mut s.to_m]);
         all.extend(s.covariance.as_flattened_mut());

@@ -334,11 +334,11 @@ proptest! {
 
     #[test]
     fn a_contribution_survives(contribution in contribution(), emulated in any::<bool>()) {
-        let wire = travelled(&wire_contribution(&contribution, target().frame, emulated));
+        let wire = travelled(&wire_contribution(&contribution, target().frame, emulated, None));
         prop_assert_eq!(wire.emulated, emulated);
         let back = check_contribution(&wire, &target()).map_err(fail_all)?;
         prop_assert_eq!(&back, &contribution);
-        let again = wire_contribution(&back, target().frame, emulated);
+        let again = wire_contribution(&back, target().frame, emulated, None);
         prop_assert_eq!(content_digest(&again), content_digest(&wire));
     }
 

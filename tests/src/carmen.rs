@@ -115,17 +115,26 @@ impl Log {
         let begin = if from == 0 { self.places[0] } else { self.places[from - 1] + 1 };
         let end = if to == self.scans.len() { self.lines.len() } else { self.places[to - 1] + 1 };
         let preamble = &self.lines[..self.places[0]];
-        let text: String = preamble
-            .iter()
-            .chain(&self.lines[begin.max(self.places[0])..end])
-            .flat_map(|line| [line.as_str(), "\n"])
-            .collect();
-        let file = std::fs::File::create(path).map_err(|e| Error::file(path, e))?;
-        let mut gzip = GzEncoder::new(file, Compression::fast());
-        gzip.write_all(text.as_bytes())
-            .and_then(|()| gzip.finish().map(drop))
-            .map_err(|e| Error::file(path, e))
+        write(preamble.iter().chain(&self.lines[begin.max(self.places[0])..end]), path)
     }
+
+    /// Writes a log of its own (gzip) that holds those scans by number that are wanted, and all else.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write_those(&self, is_wanted: impl Fn(usize) -> bool, path: &Path) -> Result<(), Error> {
+        let wanted = |line: &usize| self.places.binary_search(line).map_or(true, &is_wanted);
+        write((0..self.lines.len()).filter(wanted).map(|line| &self.lines[line]), path)
+    }
+}
+
+fn write<'a>(lines: impl Iterator<Item = &'a String>, path: &Path) -> Result<(), Error> {
+    let text: String = lines.flat_map(|line| [line.as_str(), "\n"]).collect();
+    let file = std::fs::File::create(path).map_err(|e| Error::file(path, e))?;
+    let mut gzip = GzEncoder::new(file, Compression::fast());
+    gzip.write_all(text.as_bytes())
+        .and_then(|()| gzip.finish().map(drop))
+        .map_err(|e| Error::file(path, e))
 }
 
 /// The text of a log, gzip or plain.

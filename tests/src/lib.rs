@@ -68,6 +68,7 @@ pub mod statistics;
 pub mod structures;
 mod surveying;
 pub mod taught;
+pub mod trajectory;
 pub mod trial;
 pub mod yardstick;
 

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use mapfold_tests::{
     alignment, buildings, change, differences, evaluation, extraction, figure, growth, honesty,
-    localization, places, plans, range, raster, serving, speed, structures,
+    localization, places, plans, range, raster, serving, speed, structures, trajectory,
 };
 
 /// Measures Mapfold and rewrites the tables of a report between their markers.
@@ -120,6 +120,18 @@ enum Command {
         #[arg(long, value_name = "DIR")]
         data: Option<PathBuf>,
     },
+    /// Plays logs with poses that the robot finds itself, on maps that another one made, and compares them with the published ones
+    Trajectories {
+        /// The page with the markers `trajectories`
+        #[arg(long, value_name = "FILE")]
+        report: PathBuf,
+        /// The folder with the logs, in `logs/`
+        #[arg(long, value_name = "DIR")]
+        data: PathBuf,
+        /// Only logs whose name contains this; the report is then left as it is
+        #[arg(long, value_name = "TEXT")]
+        only: Option<String>,
+    },
     /// Draws a hallway's vector map from a few scans of the committed log
     Figure {
         /// The SVG to write
@@ -176,6 +188,9 @@ async fn main() -> ExitCode {
         Command::Localization { report } => localization::tables(&report),
         Command::Places { report, data } => places::table(&report, data.as_deref()),
         Command::Alignment { report, data } => alignment::table(&report, data.as_deref()),
+        Command::Trajectories { report, data, only } => {
+            trajectory::table(&report, &data, only.as_deref()).await
+        }
         Command::Figure { out } => figure::write(&out).await.map(|()| Vec::new()),
         Command::Raster { report, picture } => raster::raster(&report, &picture),
         Command::Benches { report, criterion } => speed::benches(&report, &criterion),

@@ -88,6 +88,7 @@ impl Place {
                 heading_rad: 0.0,
                 covariance: [[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-6]],
                 provenance: Provenance::Datum,
+                basis: None,
             },
             segments: Vec::new(),
             clusters: Vec::new(),

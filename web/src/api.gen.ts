@@ -669,8 +669,8 @@ export interface paths {
         options?: never;
         head?: never;
         /**
-         * Changes a robot: what is absent stays. A robot may report its own `revision` and
-         *     `queue_length`; all else needs `admin`.
+         * Changes a robot: what is absent stays. A robot may report its own `revision`,
+         *     `queue_length` and `fix`; all else needs `admin`.
          */
         patch: operations["update_robot"];
         trace?: never;
@@ -1098,6 +1098,51 @@ export interface components {
          * @enum {string}
          */
         FindingSeverity: "warning" | "error";
+        /**
+         * @description What a robot was localized by, that has found itself: so that it can be told later which poses owe what to which
+         *     walls.
+         */
+        FixBasis: {
+            /** @description The map's landmarks that it was matched with, [x, y], at most 1024. */
+            landmarks_m?: number[][];
+            /**
+             * Format: int64
+             * @description The revision of the map that the robot went by.
+             */
+            revision: number;
+            /** @description Ids of the map's segments that this look was matched with, at most 1024. */
+            segments?: string[];
+            /**
+             * Format: double
+             * @description Metres driven since it last found its place from nothing.
+             */
+            way_m: number;
+        };
+        /**
+         * @description How well a robot knows its place.
+         * @enum {string}
+         */
+        FixKind: "unique" | "tracked" | "ambiguous" | "no_match";
+        /** @description Where a robot may be. */
+        FixPlace: {
+            /** @description Covariance of (x, y, heading). */
+            covariance: number[][];
+            /**
+             * Format: double
+             * @description Heading.
+             */
+            heading_rad: number;
+            /**
+             * Format: double
+             * @description Position, x.
+             */
+            x_m: number;
+            /**
+             * Format: double
+             * @description Position, y.
+             */
+            y_m: number;
+        };
         /** @description The answer to an edit or a publication. */
         GdbAnswer: {
             /**
@@ -2194,6 +2239,7 @@ export interface components {
         };
         /** @description `level_from_robot` with its covariance. */
         PoseEstimate: {
+            basis?: components["schemas"]["FixBasis"] | null;
             /** @description Covariance of (x, y, heading), row by row. */
             covariance: number[][];
             /**
@@ -2459,6 +2505,7 @@ export interface components {
              * @description Contributions of it that the server has.
              */
             contributions: number;
+            fix?: components["schemas"]["RobotFix"] | null;
             last_pose?: components["schemas"]["LastPose"] | null;
             /** @description Name for people. */
             name: string;
@@ -2484,6 +2531,21 @@ export interface components {
             /** @description Whether what it sends goes into the map. */
             state: components["schemas"]["RobotState"];
         };
+        /** @description What a robot knows of its place. */
+        RobotFix: {
+            /** @description How well it knows. */
+            kind: components["schemas"]["FixKind"];
+            /** @description The map's landmarks that it was matched with, [x, y], at most 1024. */
+            landmarks_m?: number[][];
+            /** @description Slug of the level. */
+            level: string;
+            /** @description When, by the robot's clock, RFC 3339. */
+            observed_at: string;
+            /** @description Where it is, or where it may be, likeliest first, at most 16: one if `unique` or `tracked`, none if `no_match`. */
+            places: components["schemas"]["FixPlace"][];
+            /** @description Ids of the map's segments that its last look was matched with, at most 1024. */
+            segments?: string[];
+        };
         /** @description Contributions of one robot. */
         RobotShare: {
             /**
@@ -2501,6 +2563,7 @@ export interface components {
         RobotState: "active" | "held";
         /** @description What may be changed of a robot; what is absent stays. */
         RobotUpdate: {
+            fix?: components["schemas"]["RobotFix"] | null;
             /** @description Name for people. */
             name?: string | null;
             /**

@@ -13,6 +13,8 @@ import type { LevelEvent } from "./wire";
 /** Least time between two questions for the map, and for the log. */
 const MAP_INTERVAL_MS = 250;
 const LOG_INTERVAL_MS = 1_000;
+/** Robots tell where they are also when nothing changes on the map. */
+const ROBOTS_MS = 2_000;
 /** A look at the level even if no event comes, should events be held up on their way. */
 const BACKSTOP_MS = 15_000;
 /** Waits before the stream is opened again; the last one repeats. */
@@ -44,6 +46,7 @@ export function followLevel(options: FeedOptions): () => void {
   let failures = 0;
   let retryTimer: number | null = null;
   let backstopTimer: number | null = null;
+  let robotsTimer: number | null = null;
   const askedFor = new Set<string>();
 
   const setLink = (link: Link): void => {
@@ -179,11 +182,25 @@ export function followLevel(options: FeedOptions): () => void {
     }, BACKSTOP_MS);
   };
 
+  const askRobots = (): void => {
+    robotsTimer = timers.setTimeout(() => {
+      void (async () => {
+        try {
+          if (state().link.kind === "live") dispatch({ kind: "robots", robots: await api.robots(place, signal) });
+        } catch (error) {
+          failed(error);
+        }
+        if (!signal.aborted) askRobots();
+      })();
+    }, ROBOTS_MS);
+  };
+
   setLink({ kind: "connecting" });
   map.request();
   log.request();
   open();
   backstop();
+  askRobots();
 
   return () => {
     abort.abort();
@@ -192,5 +209,6 @@ export function followLevel(options: FeedOptions): () => void {
     log.stop();
     if (retryTimer !== null) timers.clearTimeout(retryTimer);
     if (backstopTimer !== null) timers.clearTimeout(backstopTimer);
+    if (robotsTimer !== null) timers.clearTimeout(robotsTimer);
   };
 }

@@ -19,6 +19,7 @@ import type {
   LevelDescription,
   RasterChanges,
   RobotDescription,
+  RobotFix,
   SessionDescription,
   SiteDescription,
   VectorPatch,
@@ -176,7 +177,7 @@ export function update(state: State, event: Event): State {
     case "robots":
       return {
         ...state,
-        robots: event.robots,
+        robots: event.robots.map(atNewestPlace),
         slots: withSlots(state.slots, event.robots.map((robot) => robot.robot)),
       };
     case "contributions":
@@ -295,6 +296,23 @@ export type PlacedRobot = RobotDescription & { last_pose: LastPose };
 /** Robots whose last pose is on the chosen level. */
 export function robotsHere(state: State): PlacedRobot[] {
   return state.robots.filter((robot): robot is PlacedRobot => isHere(state, robot));
+}
+
+/** The robot where it is by the newest that is known: it reports its place before it contributes what it saw there. */
+function atNewestPlace(robot: RobotDescription): RobotDescription {
+  const { fix, last_pose: last } = robot;
+  const place = fix?.kind === "unique" || fix?.kind === "tracked" ? fix.places.at(0) : undefined;
+  if (fix == null || place === undefined) return robot;
+  if (last != null && Date.parse(last.observed_at) >= Date.parse(fix.observed_at)) return robot;
+  return { ...robot, last_pose: { ...place, level: fix.level, observed_at: fix.observed_at } };
+}
+
+/** What a robot knows of its place on the chosen level, unless it has contributed from another one since. */
+export function fixHere(state: State, robot: RobotDescription): RobotFix | null {
+  const { fix, last_pose: last } = robot;
+  if (fix?.level !== state.place?.level || fix == null) return null;
+  const isOld = last != null && Date.parse(last.observed_at) > Date.parse(fix.observed_at);
+  return isOld ? null : fix;
 }
 
 /** Whether a robot's last pose is on the chosen level. */

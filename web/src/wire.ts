@@ -43,7 +43,15 @@ export type VectorPatch = Exactly<
 >;
 
 export type LastPose = Exactly<Wire["LastPose"], { covariance: Matrix3 }>;
-export type RobotDescription = Exactly<Wire["RobotDescription"], { last_pose?: LastPose | null }>;
+export type FixPlace = Exactly<Wire["FixPlace"], { covariance: Matrix3 }>;
+export type RobotFix = Exactly<
+  Wire["RobotFix"],
+  { places: FixPlace[]; landmarks_m?: [number, number][] }
+>;
+export type RobotDescription = Exactly<
+  Wire["RobotDescription"],
+  { last_pose?: LastPose | null; fix?: RobotFix | null }
+>;
 
 export type ContributionEntry = Exactly<Wire["ContributionEntry"], { pose: [number, number, number] }>;
 export type ContributionPage = Exactly<Wire["ContributionPage"], { contributions: ContributionEntry[] }>;

@@ -1,5 +1,7 @@
 import { describe, expect, it } from "vitest";
-import { isSilent, robotsHere, SILENT_AFTER_MS, update, type State } from "../src/state";
+import { fixInWords } from "../src/panels/selection_card";
+import { fixHere, isSilent, robotsHere, SILENT_AFTER_MS, update, type State } from "../src/state";
+import type { RobotFix } from "../src/wire";
 import { after, entry, lastPose, level, NOON_MS, ON_GROUND, robot, segment, vectorPatch } from "./samples";
 
 const ground = after(...ON_GROUND);
@@ -142,5 +144,33 @@ describe("events", () => {
     expect(state.view).toEqual({ kind: "at", xLevelM: 1, yLevelM: 2, resolution: 0.1 });
     expect(state.layers.grid.on).toBe(true);
     expect(state.evidence).toBe("sonar");
+  });
+});
+
+describe("what robots know of their places", () => {
+  const place = { x_m: 3, y_m: 4, heading_rad: 0.5, covariance: lastPose("ground").covariance };
+  const fix = (fields: Partial<RobotFix> = {}): RobotFix => ({
+    level: "ground", observed_at: "2026-11-22T12:00:00Z", kind: "tracked", places: [place], segments: [], ...fields,
+  });
+  const told = (report: RobotFix): State => update(ground, { kind: "robots", robots: [robot("ada", { fix: report })] });
+
+  it("shows a robot where it reports to be, before it contributes from there", () => {
+    expect(robotsHere(told(fix())).map((r) => r.last_pose.x_m)).toEqual([3]);
+    const old = fix({ observed_at: "2026-11-22T11:00:00Z" });
+    expect(robotsHere(told(old)).map((r) => r.last_pose.x_m)).toEqual([0]);
+  });
+
+  it("does not move a robot that is not sure, and tells where it may be", () => {
+    const state = told(fix({ kind: "ambiguous", places: [place, place] }));
+    expect(robotsHere(state).map((r) => r.last_pose.x_m)).toEqual([0]);
+    expect(state.robots.map((r) => fixHere(state, r)?.places.length)).toEqual([2]);
+    expect(told(fix({ level: "upper" })).robots.map((r) => fixHere(ground, r))).toEqual([null]);
+  });
+
+  it("is said in words", () => {
+    expect(fixInWords(fix({ segments: ["a", "b"], landmarks_m: [[1, 2]] })))
+      .toBe("tracked, last look matched with 2 walls and 1 landmark");
+    expect(fixInWords(fix({ kind: "ambiguous", places: [place, place] }))).toBe("not sure: 2 places may be it");
+    expect(fixInWords(fix({ kind: "no_match", places: [] }))).toContain("lost");
   });
 });

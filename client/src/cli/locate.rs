@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use mapfold_client::localization::{
-    Candidate, Fix, KnownLevel, Localized, Localizer, LocalizerConfig, Seeker, view,
+    Candidate, Fix, KnownLevel, Localized, Localizer, LocalizerConfig, NOTHING_KNOWN, Seeker, view,
 };
 use mapfold_client::log::{Log, Observation, Reading, carmen};
 use mapfold_client::perception::Perception;
@@ -72,27 +72,14 @@ impl Locate {
         config: &LocalizerConfig,
     ) -> Result<KnownLevel, Box<dyn std::error::Error>> {
         let level = self.place.level();
-        let folder = self.mirror.clone().unwrap_or_else(|| {
-            PathBuf::from("mapfold-robot-data").join(format!("{level}.mirror").replace('/', "."))
-        });
+        let folder = self.mirror.clone().unwrap_or_else(|| Mirror::default_folder(&level));
         let mut mirror = Mirror::open(&folder, &level, MirrorConfig::STANDARD)?;
-        match mirror.refresh(&self.place.api()?).await {
-            Err(error) if error.is_retryable() && mirror.frame().is_some() => {
-                say(&format!("{error}; going by the mirror at revision {}", mirror.revision()));
-            }
-            outcome => {
-                outcome?;
-            }
+        if let Some(error) = mirror.refresh_if_reachable(&self.place.api()?).await? {
+            say(&format!("{error}; going by the mirror at revision {}", mirror.revision()));
         }
         let resolution_m = mirror.resolution_m().ok_or("the mirror is empty")?;
-        if mirror.map().tiles.is_empty() && mirror.map().prior.is_empty() {
-            return Err(format!(
-                "{level} has no raster yet: nobody has contributed to it, and no plan is published \
-                 as its prior"
-            )
-            .into());
-        }
-        Ok(KnownLevel::of_map(mirror.map(), resolution_m, config))
+        KnownLevel::of_map(mirror.map(), resolution_m, config)
+            .ok_or_else(|| format!("{level} {NOTHING_KNOWN}").into())
     }
 
     /// The fix of each scan by itself.
@@ -150,6 +137,10 @@ fn track(
                 told["matched"] = matched.into();
                 told["runner_up"] = Value::Null;
                 write(&told)?;
+            }
+            Localized::Doubted(_) => {
+                counts.count(&Fix::NoMatch);
+                write(&of_fix(reading.time_s, &Fix::NoMatch, view.beams.len()))?;
             }
             Localized::Sought(fix) => {
                 counts.count(&fix);

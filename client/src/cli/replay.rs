@@ -21,6 +21,8 @@ enum Poses {
     Log,
     /// Dead reckoning from the first pose on.
     Odometry,
+    /// Found on the map as it is now, then tracked with odometry and the sensors.
+    Localize,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -90,7 +92,8 @@ pub(super) struct Replay {
     #[arg(long, value_name = "DIR")]
     outbox: Option<PathBuf>,
     /// Folder of a mirror of the level, made or brought up to date first: walls that scanners have found tell
-    /// which echoes of sonars come from behind them.
+    /// which echoes of sonars come from behind them, and with --poses localize the robot finds itself on it (one
+    /// under ./mapfold-robot-data if absent).
     #[arg(long, value_name = "DIR")]
     mirror: Option<PathBuf>,
     /// Give up after so many seconds; never if absent.
@@ -137,6 +140,7 @@ impl Replay {
             poses: match self.poses {
                 Poses::Log => PoseSource::Log,
                 Poses::Odometry => PoseSource::Odometry,
+                Poses::Localize => PoseSource::Localize,
             },
             pose_sd: PoseSd { position_m: self.pose_sd, heading_rad: self.heading_sd.to_radians() },
             provenance: match self.provenance {

@@ -10,7 +10,7 @@
 use mapfold_map::geometry::{Covariance, Level, Pose, Robot, UncertainPose, difference};
 use mapfold_map::places::{Found, LikelihoodField, Place, PlacesConfig, View, place_near, search};
 
-use crate::robot::OdometryNoise;
+use crate::odometry::OdometryNoise;
 
 /// When a robot that seeks looks again, and what it believes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -229,9 +229,8 @@ impl Seeker {
     }
 }
 
-/// Deviations of a candidate are not less than this once it is a fix, metres and radians: cells are as large.
-pub(super) fn fix_of(candidate: &Candidate) -> UncertainPose<Level, Robot> {
+/// Deviations of a place are not less than this once it is a fix, metres and radians: cells are as large.
+pub(super) fn fix_of(place: &UncertainPose<Level, Robot>) -> UncertainPose<Level, Robot> {
     let least = Covariance::from_variances([4e-4, 4e-4, 2.5e-5]);
-    let UncertainPose { pose, covariance } = candidate.level_from_robot;
-    UncertainPose { pose, covariance: covariance + least }
+    UncertainPose { pose: place.pose, covariance: place.covariance + least }
 }

@@ -12,7 +12,7 @@ use super::lines::{self, Reach};
 use super::reference_walls::{ReferenceWall, ReferenceWalls};
 use super::watchdog::{Tracking, Verdict, Watchdog, WatchdogConfig};
 use super::{landmarks, sonar};
-use crate::robot::OdometryNoise;
+use crate::odometry::OdometryNoise;
 use crate::sensor::{Ring, SonarProfile};
 
 /// How a robot is tracked.

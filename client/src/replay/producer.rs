@@ -9,8 +9,8 @@ use tokio::time::{Instant, sleep_until};
 use uuid::Uuid;
 
 use super::{AHEAD_MAX, CHUNK, ReplayError, ReplayProgress, TICK, worker};
-use crate::log::Log;
-use crate::robot::{KnownWalls, MappedWalls, Passed, SonarVerdicts, Surveyor};
+use crate::log::{Log, Reading};
+use crate::robot::{KnownWalls, Look, MappedWalls, Passed, Probation, SonarVerdicts, Surveyor};
 use crate::sync::{Outbox, OutboxConfig, OutboxContents, Pushed};
 
 /// What became of the readings.
@@ -49,6 +49,11 @@ pub(super) fn in_words(passed: Passed) -> &'static str {
         Passed::NoPose => "have no pose in the log",
         Passed::NoOdometry => "have no odometry in the log",
         Passed::Lost => "lie too far along to be placed by odometry",
+        Passed::NoMap => "have no map to be placed on",
+        Passed::Unplaced => "were taken before the robot had found its place, or while it was lost",
+        Passed::Doubted => {
+            "do not fit the map where the robot should have been, or were taken shortly before it turned out to be lost"
+        }
     }
 }
 
@@ -56,31 +61,40 @@ pub(super) fn in_words(passed: Passed) -> &'static str {
 pub(super) struct Producer {
     log: Arc<Log>,
     numbers: Arc<[u32]>,
-    surveyor: Option<Surveyor>,
-    walls: Option<Arc<MappedWalls>>,
-    frame: Uuid,
+    /// Absent while a worker has it.
+    work: Option<Work>,
+    ground: Ground,
     outbox: Arc<Outbox>,
-    surveyed: Surveyed,
+    fixes: watch::Sender<Option<v1::RobotFix>>,
+}
+
+/// What the poses are in.
+pub(super) struct Ground {
+    /// UUID of the level's frame.
+    pub(super) frame: Uuid,
+    /// Slug of the level.
+    pub(super) level: String,
 }
 
 impl Producer {
-    /// One for the readings with these `numbers`.
+    /// One for the readings with these `numbers`; `fixes` hears where the robot finds itself.
     pub(super) fn new(
         log: Log,
         numbers: Vec<u32>,
         surveyor: Surveyor,
         walls: Option<MappedWalls>,
-        frame: Uuid,
+        ground: Ground,
         outbox: Arc<Outbox>,
+        fixes: watch::Sender<Option<v1::RobotFix>>,
     ) -> Self {
+        let (probation, surveyed) = (Probation::default(), Surveyed::default());
         Self {
             log: Arc::new(log),
             numbers: numbers.into(),
-            surveyor: Some(surveyor),
-            walls: walls.map(Arc::new),
-            frame,
+            work: Some(Work { surveyor, walls, probation, surveyed }),
+            ground,
             outbox,
-            surveyed: Surveyed::default(),
+            fixes,
         }
     }
 
@@ -110,12 +124,11 @@ impl Producer {
             let _ = contents.wait_for(room).await;
             self.survey(next..due).await?;
             next = due;
-            progress.send_modify(|p| {
-                p.surveyed = self.surveyed.readings;
-                p.known = self.surveyed.known;
-            });
+            let played =
+                self.work.as_ref().map(|work| (work.surveyed.readings, work.surveyed.known));
+            progress.send_modify(|p| (p.surveyed, p.known) = played.unwrap_or_default());
         }
-        Ok(self.surveyed)
+        Ok(self.work.map(|work| work.surveyed).unwrap_or_default())
     }
 
     /// The end of the readings from `from` on, at most `to`, that were taken within `seconds` of
@@ -129,48 +142,87 @@ impl Producer {
 
     /// Surveys a stretch of readings and lays it into the outbox, off the async threads.
     async fn survey(&mut self, stretch: std::ops::Range<usize>) -> Result<(), ReplayError> {
-        let Some(mut surveyor) = self.surveyor.take() else {
+        let Some(mut work) = self.work.take() else {
             return Err(ReplayError::Worker("the surveyor is gone".to_owned()));
         };
         let (log, numbers) = (Arc::clone(&self.log), Arc::clone(&self.numbers));
-        let (outbox, frame) = (Arc::clone(&self.outbox), self.frame);
-        let mut surveyed = std::mem::take(&mut self.surveyed);
-        let walls = self.walls.clone();
-        let (surveyor, surveyed) = worker(move || {
-            let mut made: Vec<v1::Contribution> = Vec::with_capacity(stretch.len());
+        let (outbox, frame) = (Arc::clone(&self.outbox), self.ground.frame);
+        let last = stretch.end.checked_sub(1).map(|last| numbers[last] as usize);
+        let time_s = last.map_or(0.0, |last| log.readings[last].time_s);
+        let work = worker(move || {
+            let is_last = stretch.end == numbers.len();
+            let mut looks = Vec::with_capacity(stretch.len());
             for number in &numbers[stretch] {
-                let reading = &log.readings[*number as usize];
-                surveyed.readings += 1;
-                let pose = match surveyor.locate(reading) {
-                    Ok(pose) => pose,
-                    Err(passed) => {
-                        *surveyed.passed.entry(passed).or_default() += 1;
-                        continue;
-                    }
-                };
-                surveyed.placed += 1;
-                let id = Uuid::from_bytes(surveyor.id(reading).0);
-                if outbox.acknowledgement(frame, id).is_some() {
-                    surveyed.known += 1;
-                } else {
-                    let walls = walls.as_deref().map(|walls| walls as &dyn KnownWalls);
-                    let look = surveyor.observe_among(reading, pose, walls);
-                    surveyed.sonar.add(&look.sonar);
-                    made.push(look.to_wire(frame));
-                }
+                let is_known = |id| outbox.acknowledgement(frame, id).is_some();
+                looks.extend(work.survey(&log.readings[*number as usize], is_known));
             }
+            if is_last {
+                looks.extend(work.probation.finish());
+            }
+            let made: Vec<v1::Contribution> =
+                looks.iter().map(|look| look.to_wire(frame)).collect();
             for pushed in outbox.push_many(&made)? {
                 match pushed {
                     Pushed::Queued | Pushed::AlreadyRefused => {}
-                    Pushed::AlreadyQueued => surveyed.waited += 1,
-                    Pushed::AlreadyAcknowledged(_) => surveyed.known += 1,
+                    Pushed::AlreadyQueued => work.surveyed.waited += 1,
+                    Pushed::AlreadyAcknowledged(_) => work.surveyed.known += 1,
                 }
             }
-            Ok::<_, ReplayError>((surveyor, surveyed))
+            Ok::<_, ReplayError>(work)
         })
         .await??;
-        self.surveyor = Some(surveyor);
-        self.surveyed = surveyed;
+        let whereabouts = work.surveyor.whereabouts();
+        if let Some(fix) = whereabouts.and_then(|w| w.report(&self.ground.level, time_s)) {
+            self.fixes.send_replace(Some(fix));
+        }
+        self.work = Some(work);
         Ok(())
+    }
+}
+
+/// What surveying goes on with from stretch to stretch.
+struct Work {
+    surveyor: Surveyor,
+    walls: Option<MappedWalls>,
+    probation: Probation,
+    surveyed: Surveyed,
+}
+
+impl Work {
+    /// Surveys one reading; the looks that are to be sent now. `is_known` tells whether the server has one.
+    fn survey(&mut self, reading: &Reading, is_known: impl Fn(Uuid) -> bool) -> Vec<Look> {
+        self.surveyed.readings += 1;
+        let located = self.surveyor.locate(reading);
+        let finds = self.surveyor.whereabouts().map(|whereabouts| whereabouts.basis().finds);
+        if located == Err(Passed::Unplaced)
+            || self.probation.finds().is_some_and(|f| Some(f) != finds)
+        {
+            self.surveyed.placed -= self.probation.len();
+            self.pass(Passed::Doubted, self.probation.len());
+            self.probation.fail();
+        }
+        let pose = match located {
+            Ok(pose) => pose,
+            Err(passed) => {
+                self.pass(passed, 1);
+                return Vec::new();
+            }
+        };
+        self.surveyed.placed += 1;
+        if is_known(Uuid::from_bytes(self.surveyor.id(reading).0)) {
+            self.surveyed.known += 1;
+            return Vec::new();
+        }
+        let walls = self.walls.as_ref().map(|walls| walls as &dyn KnownWalls);
+        let look = self.surveyor.observe_among(reading, pose, walls);
+        self.surveyed.sonar.add(&look.sonar);
+        self.probation.pass(look)
+    }
+
+    /// So many readings give no contribution.
+    fn pass(&mut self, passed: Passed, count: u64) {
+        if count > 0 {
+            *self.surveyed.passed.entry(passed).or_default() += count;
+        }
     }
 }

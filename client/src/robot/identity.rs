@@ -63,6 +63,11 @@ impl Identity {
                 put(b"odometry");
                 figures.push(f64::from(first));
             }
+            // Of the map that it went by nothing: who plays on after a pause has a newer one.
+            PoseSource::Localize => {
+                put(b"localize");
+                figures.push(f64::from(first));
+            }
         }
         if let Some(scanner) = scanner {
             let ScannerProfile {

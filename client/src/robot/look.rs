@@ -1,11 +1,13 @@
 //! What one reading comes to: features and evidence.
 
+use std::borrow::Cow;
+
 use mapfold_map::level::Contribution;
 use mapfold_schema::border::wire_contribution;
 use mapfold_schema::v1;
 use uuid::Uuid;
 
-use super::{Scanner, Surveyor};
+use super::{Basis, Scanner, Surveyor};
 use crate::emulation::{self, Chance};
 use crate::evidence::{KnownWalls, SonarVerdicts, scanner_evidence, sonar_evidence};
 use crate::log::{Observation, Reading};
@@ -19,6 +21,8 @@ pub struct Look {
     pub contribution: Contribution,
     /// Whether its readings were derived from those of another sensor.
     pub emulated: bool,
+    /// What its pose owes to the map, if the robot found itself.
+    pub basis: Option<Basis>,
     /// What was thought of its sonar readings.
     pub sonar: SonarVerdicts,
 }
@@ -26,7 +30,8 @@ pub struct Look {
 impl Look {
     /// As it travels, for the level with this `frame`.
     pub fn to_wire(&self, frame: Uuid) -> v1::Contribution {
-        wire_contribution(&self.contribution, frame, self.emulated)
+        let basis = self.basis.as_ref().map(Basis::to_wire);
+        wire_contribution(&self.contribution, frame, self.emulated, basis)
     }
 }
 
@@ -37,20 +42,29 @@ pub(super) fn fill(
     walls: Option<&dyn KnownWalls>,
     look: &mut Contribution,
 ) -> SonarVerdicts {
-    match (&reading.observation, surveyor.emulation) {
-        (Observation::Ring(ring), _) => hear(surveyor, ring, walls, look),
+    match (&reading.observation, ring(surveyor, reading)) {
+        (_, Some(ring)) => hear(surveyor, &ring, walls, look),
         (Observation::Scan(scan), None) => {
             see(surveyor, scan, look);
             SonarVerdicts::default()
         }
+        (Observation::Ring(_), None) => SonarVerdicts::default(),
+    }
+}
+
+/// What the robot's sonars heard: as the log has it, or as they would have heard what its scanner saw.
+pub(super) fn ring<'a>(surveyor: &Surveyor, reading: &'a Reading) -> Option<Cow<'a, Ring>> {
+    match (&reading.observation, surveyor.emulation) {
+        (Observation::Ring(ring), _) => Some(Cow::Borrowed(ring)),
+        (Observation::Scan(_), None) => None,
         (Observation::Scan(scan), Some(config)) => {
-            let Some(profile) = &surveyor.sonar else { return SonarVerdicts::default() };
+            let profile = surveyor.sonar.as_ref()?;
             // The id's own chance: the same reading is always heard the same.
+            let id = surveyor.id(reading);
             let mut seed = [0; 8];
-            seed.copy_from_slice(&look.id.0[8..]);
+            seed.copy_from_slice(&id.0[8..]);
             let mut chance = Chance::new(u64::from_be_bytes(seed));
-            let ring = emulation::emulate(scan, profile, &config, &mut chance);
-            hear(surveyor, &ring, walls, look)
+            Some(Cow::Owned(emulation::emulate(scan, profile, &config, &mut chance)))
         }
     }
 }

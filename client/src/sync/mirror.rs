@@ -266,6 +266,26 @@ impl Mirror {
         Ok(refreshed)
     }
 
+    /// Brings it up to date if the server can be reached, and else leaves it as it was when it last could; why, then.
+    ///
+    /// # Errors
+    /// As for [`Self::refresh`]; a server out of reach too, if there is no earlier mirror to go by.
+    pub async fn refresh_if_reachable(
+        &mut self,
+        api: &Api,
+    ) -> Result<Option<MirrorError>, MirrorError> {
+        match self.refresh(api).await {
+            Ok(_) => Ok(None),
+            Err(error) if error.is_retryable() && self.frame().is_some() => Ok(Some(error)),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The folder in which a robot keeps its mirror of a level unless it is told another one.
+    pub fn default_folder(level: &LevelAddress) -> PathBuf {
+        PathBuf::from("mapfold-robot-data").join(format!("{level}.mirror").replace('/', "."))
+    }
+
     /// Refreshes every `interval`, through outages too, until `stop` says true (or its sender is
     /// gone). `tell` hears of every try.
     ///

@@ -46,6 +46,7 @@ pub(super) fn contribution(n: u64) -> v1::Contribution {
             heading_rad: 0.1 * (place % 5.0),
             covariance: [[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-5]],
             provenance: v1::Provenance::Datum,
+            basis: None,
         },
         segments: vec![v1::ObservedSegment {
             rho_m: 1.5,

@@ -202,6 +202,7 @@ fn described(robot: &v1::NewRobot) -> v1::RobotDescription {
         last_pose: None,
         revision: None,
         queue_length: None,
+        fix: None,
         contributions: 0,
         reverted: 0,
     }

@@ -255,6 +255,11 @@ impl LikelihoodField {
         search.free = Pyramid::new(&free, search.size, 0, 0);
     }
 
+    /// Logarithm of how much likelier a place must be than all others together.
+    pub fn odds(&self) -> f64 {
+        self.config.odds
+    }
+
     /// Logarithm of the number of places that can be told apart.
     pub fn ln_places(&self) -> f64 {
         let (apart, turned) = self.config.apart;

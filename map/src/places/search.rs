@@ -17,6 +17,10 @@ use crate::geometry::{Level, Point, Pose, Robot, difference};
 const TRIED: (f64, f64) = (0.25, 0.03);
 /// Headings within this of a place that is kept belong to it, radians.
 const SAME_HEADING: f64 = 0.15;
+/// Headings around a known one are so far apart, radians: a beam of the search's range moves by two cells.
+const HEADING_STEP: f64 = 0.0175;
+/// Blocks to begin with around a known pose: 8 cells.
+const NEAR_LEVEL: u8 = 3;
 /// Beams between two looks at whether a block can still come to anything.
 const CHUNK: usize = 16;
 
@@ -44,6 +48,62 @@ pub fn place_near(field: &LikelihoodField, view: &View, pose: &Pose<Level, Robot
 /// fit it as well as the best to within the odds and the margin, and better than one of so many must by chance. `proposals` are poses to begin with, from landmarks that
 /// were matched for instance; the answer does not depend on them, only the time that it takes.
 pub fn search(field: &LikelihoodField, view: &View, proposals: &[Pose<Level, Robot>]) -> Found {
+    let headings = field.search.directions.headings(&view.walls);
+    let (width, height) = field.search.size;
+    let window = Window {
+        level: LEVELS as u8 - 1,
+        x: (0, width as i32 - 1),
+        y: (0, height as i32 - 1),
+        ln_places: field.ln_places(),
+    };
+    within(field, view, headings, &window, proposals)
+}
+
+/// The same around a pose that is known to within `reach` metres along each axis and `turn` radians: places that
+/// fit better than one of so few must by chance. Some of them may lie a little beyond.
+pub fn search_near(
+    field: &LikelihoodField,
+    view: &View,
+    around: &Pose<Level, Robot>,
+    (reach, turn): (f64, f64),
+) -> Found {
+    let steps = (turn / HEADING_STEP).ceil() as i32;
+    let heading = |step: i32| around.heading() + f64::from(step) * HEADING_STEP;
+    let cell = |at: f64, corner: f64| ((at - corner) / field.search.cell).floor() as i32;
+    let side = 1 << NEAR_LEVEL;
+    let (corner, (width, height)) = (field.search.corner, field.search.size);
+    // From the beginning of a block on, and never off the map.
+    let span = |at: f64, corner: f64, size: usize| {
+        let low = cell(at - reach, corner).div_euclid(side) * side;
+        (low.max(0), cell(at + reach, corner).min(size as i32 - 1))
+    };
+    let (apart, turned) = field.config.apart;
+    let places = (2.0 * reach / apart).max(1.0).powi(2) * (2.0 * turn / turned).max(1.0);
+    let window = Window {
+        level: NEAR_LEVEL,
+        x: span(around.x, corner.x, width),
+        y: span(around.y, corner.y, height),
+        ln_places: places.ln(),
+    };
+    within(field, view, (-steps..=steps).map(heading).collect(), &window, &[*around])
+}
+
+/// Where to search: blocks of a level from cell to cell.
+struct Window {
+    level: u8,
+    x: (i32, i32),
+    y: (i32, i32),
+    /// Logarithm of the number of places in it that can be told apart.
+    ln_places: f64,
+}
+
+fn within(
+    field: &LikelihoodField,
+    view: &View,
+    headings: Vec<f64>,
+    window: &Window,
+    proposals: &[Pose<Level, Robot>],
+) -> Found {
     let config = &field.config;
     let beams = thinned(&view.beams, config.beams_max);
     let is_near = |beam: &&Beam| beam.to.norm() <= config.search_range;
@@ -52,7 +112,6 @@ pub fn search(field: &LikelihoodField, view: &View, proposals: &[Pose<Level, Rob
         let rest = config.temper * config.elsewhere * beams.len() as f64;
         return Found { places: Vec::new(), rest, blocks: 0 };
     }
-    let headings = field.search.directions.headings(&view.walls);
     let turned = headings.iter().map(|heading| turned(field, &near, *heading)).collect();
     let mut search = Search {
         field,
@@ -60,17 +119,18 @@ pub fn search(field: &LikelihoodField, view: &View, proposals: &[Pose<Level, Rob
         near: near.len(),
         headings,
         turned,
+        ln_places: window.ln_places,
         least: 1,
         best: f64::NEG_INFINITY,
         places: Vec::new(),
         tried: Vec::new(),
     };
     // What is no likelier than a place elsewhere is of no interest: among so many, one fits by chance.
-    search.raise(field.ln_places());
+    search.raise(window.ln_places);
     for proposal in proposals {
         search.weigh(*proposal);
     }
-    let (rest, blocks) = search.run();
+    let (rest, blocks) = search.run(window);
     let mut places = search.places;
     places.retain(|place| place.fit >= search.best - config.odds - config.margin);
     places.sort_by(|a, b| b.fit.total_cmp(&a.fit));
@@ -107,6 +167,7 @@ struct Search<'a> {
     near: usize,
     headings: Vec<f64>,
     turned: Vec<Turned>,
+    ln_places: f64,
     /// What a block must come to, in steps.
     least: u32,
     /// How well the best place so far fits.
@@ -118,9 +179,9 @@ struct Search<'a> {
 impl Search<'_> {
     /// Looks into blocks until none can hold a place that matters; answers what no other place exceeds, and how
     /// many blocks there were.
-    fn run(&mut self) -> (f64, usize) {
+    fn run(&mut self, window: &Window) -> (f64, usize) {
         let config = &self.field.config;
-        let mut blocks = self.coarsest();
+        let mut blocks = self.coarsest(window);
         let mut opened = 0;
         while let Some(block) = blocks.pop() {
             if block.bound < self.least {
@@ -152,13 +213,12 @@ impl Search<'_> {
         (self.fit_of(self.least), opened)
     }
 
-    fn coarsest(&self) -> BinaryHeap<Block> {
-        let level = LEVELS as u8 - 1;
-        let (width, height) = self.field.search.size;
+    fn coarsest(&self, window: &Window) -> BinaryHeap<Block> {
+        let level = window.level;
         let mut blocks = Vec::new();
         for heading in 0..self.headings.len() as u16 {
-            for y in (0..height as i32).step_by(1 << level) {
-                for x in (0..width as i32).step_by(1 << level) {
+            for y in (window.y.0..=window.y.1).step_by(1 << level) {
+                for x in (window.x.0..=window.x.1).step_by(1 << level) {
                     let bound = self.bound(level, heading, x, y);
                     if bound >= self.least {
                         blocks.push(Block { bound, level, heading, x, y });
@@ -221,8 +281,7 @@ impl Search<'_> {
         self.tried.push(pose);
         let place = weighed(self.field, self.beams, &refined(self.field, self.beams, pose));
         let config = &self.field.config;
-        if place.fit < self.field.ln_places() || place.fit < self.best - config.odds - config.margin
-        {
+        if place.fit < self.ln_places || place.fit < self.best - config.odds - config.margin {
             return;
         }
         if place.fit > self.best {

@@ -83,6 +83,7 @@ pub(super) fn weighed(field: &LikelihoodField, beams: &[Beam], pose: &Pose<Level
         fit: config.temper * (config.elsewhere * count - cost),
         hits: hits / count.max(1.0),
         throughs: throughs / count.max(1.0),
+        beams: beams.len(),
     }
 }
 

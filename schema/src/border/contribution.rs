@@ -22,12 +22,13 @@ const OBSERVED_BEFORE_US: i64 = 7_258_118_400_000_000;
 /// Segments or clusters whose places fit the index of a feature's identity.
 const FEATURES_MAX: usize = 1 << 16;
 
-/// A contribution for the wire: what the map's type does not know is the level's `frame` and
-/// whether the readings were `emulated`.
+/// A contribution for the wire: what the map's type does not know is the level's `frame`,
+/// whether the readings were `emulated`, and what the pose was told by.
 pub fn wire_contribution(
     contribution: &Contribution,
     frame: Uuid,
     emulated: bool,
+    basis: Option<v1::FixBasis>,
 ) -> v1::Contribution {
     let pose = &contribution.level_from_robot;
     v1::Contribution {
@@ -42,6 +43,7 @@ pub fn wire_contribution(
             heading_rad: pose.pose.heading(),
             covariance: pose.covariance.rows(),
             provenance: contribution.provenance.into(),
+            basis,
         },
         segments: contribution.segments.iter().map(wire_observed_segment).collect(),
         clusters: contribution.clusters.iter().map(wire_observed_cluster).collect(),

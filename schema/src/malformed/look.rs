@@ -52,6 +52,11 @@ fn pose(target: &Target) -> Vec<Fault> {
         ),
         at("/pose/covariance/2/2", json!(50), "covariance_too_large", "a heading lost by a turn"),
         at("/pose/covariance/0/2", json!(-1e300), "covariance_too_large", "a huge covariance"),
+        at("/pose/basis/revision", json!(-1), "out_of_range", "a map before there was one"),
+        at("/pose/basis/way_m", json!(-0.5), "out_of_range", "a way of less than nothing"),
+        at("/pose/basis/segments/0", json!("north"), "bad_id", "a wall without identity"),
+        at("/pose/basis/segments", json!(vec!["x"; 1025]), "too_many", "a fix on too many walls"),
+        at("/pose/basis/landmarks_m/0/1", json!(1e300), "out_of_range", "a landmark far away"),
     ]
 }
 

@@ -48,6 +48,26 @@ pub struct PoseEstimate {
     pub covariance: [[f64; 3]; 3],
     /// Where the pose comes from.
     pub provenance: Provenance,
+    /// What of the map told it, if the robot found itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub basis: Option<FixBasis>,
+}
+
+/// What a robot was localized by, that has found itself: so that it can be told later which poses owe what to which
+/// walls.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FixBasis {
+    /// The revision of the map that the robot went by.
+    pub revision: i64,
+    /// Metres driven since it last found its place from nothing.
+    pub way_m: f64,
+    /// Ids of the map's segments that this look was matched with, at most 1024.
+    #[serde(default)]
+    pub segments: Vec<String>,
+    /// The map's landmarks that it was matched with, [x, y], at most 1024.
+    #[serde(default)]
+    pub landmarks_m: Vec<[f64; 2]>,
 }
 
 /// Where a pose comes from.

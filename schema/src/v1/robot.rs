@@ -37,6 +37,57 @@ pub struct RobotUpdate {
     /// Contributions that wait in its outbox, as it reports.
     #[serde(default)]
     pub queue_length: Option<i64>,
+    /// What it knows of its place, as it reports.
+    #[serde(default)]
+    pub fix: Option<RobotFix>,
+}
+
+/// What a robot knows of its place.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RobotFix {
+    /// Slug of the level.
+    pub level: String,
+    /// When, by the robot's clock, RFC 3339.
+    pub observed_at: String,
+    /// How well it knows.
+    pub kind: FixKind,
+    /// Where it is, or where it may be, likeliest first, at most 16: one if `unique` or `tracked`, none if `no_match`.
+    pub places: Vec<FixPlace>,
+    /// Ids of the map's segments that its last look was matched with, at most 1024.
+    #[serde(default)]
+    pub segments: Vec<String>,
+    /// The map's landmarks that it was matched with, [x, y], at most 1024.
+    #[serde(default)]
+    pub landmarks_m: Vec<[f64; 2]>,
+}
+
+/// How well a robot knows its place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FixKind {
+    /// Found from nothing just now, and there is no other place.
+    Unique,
+    /// Carried on since it was found, and held against the map.
+    Tracked,
+    /// One of several, or one that is not among them.
+    Ambiguous,
+    /// Nothing on the map fits what it sees.
+    NoMatch,
+}
+
+/// Where a robot may be.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FixPlace {
+    /// Position, x.
+    pub x_m: f64,
+    /// Position, y.
+    pub y_m: f64,
+    /// Heading.
+    pub heading_rad: f64,
+    /// Covariance of (x, y, heading).
+    pub covariance: [[f64; 3]; 3],
 }
 
 /// Whether what a robot sends goes into the map.
@@ -88,6 +139,9 @@ pub struct RobotDescription {
     /// Contributions that wait in its outbox, as it last reported.
     #[serde(default)]
     pub queue_length: Option<i64>,
+    /// What it knew of its place when it last reported.
+    #[serde(default)]
+    pub fix: Option<RobotFix>,
     /// Contributions of it that the server has.
     pub contributions: i64,
     /// Those of them that are reverted.

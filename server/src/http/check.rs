@@ -1,10 +1,11 @@
 //! What people set up or ask for, checked before it is stored: slugs, names, figures, spans.
 
-use mapfold_schema::border::{Violation, check_sensors};
+use mapfold_schema::border::{Violation, check_sensors, parse_feature_id};
 use mapfold_schema::instant::parse_rfc3339;
 use mapfold_schema::slug::{SLUG_LENGTH_MAX, is_slug};
 use mapfold_schema::v1::{
-    NewLevel, NewModelChangeAnswer, NewRevert, NewRobot, NewSite, RobotUpdate, Scope, SensorProfile,
+    FixKind, NewLevel, NewModelChangeAnswer, NewRevert, NewRobot, NewSite, RobotFix, RobotUpdate,
+    Scope, SensorProfile,
 };
 
 use super::problem::ApiError;
@@ -25,6 +26,12 @@ const UPPER_MAX_M: f64 = 100.0;
 /// Length of a slice of evidence, seconds: ten minutes, shorter than which few looks come together, to
 /// thirty days.
 const SLICE_S: std::ops::RangeInclusive<u32> = 600..=2_592_000;
+/// Places that a robot may think of at once.
+const FIX_PLACES_MAX: usize = 16;
+/// Segments, and landmarks, that one of its looks is matched with.
+const FIX_MATCHED_MAX: usize = 1024;
+/// No figure of a place is larger: metres, radians, and their squares.
+const FIX_FIGURE_MAX: f64 = 1e6;
 /// What a robot's token may allow: never what operators do.
 const ROBOT_SCOPES: [Scope; 2] = [Scope::MapRead, Scope::MapContribute];
 
@@ -58,6 +65,33 @@ impl Findings {
 
     fn sensors(&mut self, sensors: &[SensorProfile]) {
         self.0.extend(check_sensors(sensors));
+    }
+
+    /// What a robot knows of its place.
+    fn fix(&mut self, fix: &RobotFix) {
+        self.slug(&fix.level, "/fix/level");
+        self.instant(Some(&fix.observed_at), "/fix/observed_at");
+        let most = match fix.kind {
+            FixKind::Unique | FixKind::Tracked => 1..=1,
+            FixKind::Ambiguous => 0..=FIX_PLACES_MAX,
+            FixKind::NoMatch => 0..=0,
+        };
+        let detail =
+            format!("one if unique or tracked, none if no match, else up to {FIX_PLACES_MAX}");
+        self.expect(most.contains(&fix.places.len()), "/fix/places", "bad_count", detail);
+        let number = |number: &f64| number.is_finite() && number.abs() <= FIX_FIGURE_MAX;
+        let fine = fix.places.iter().all(|place| {
+            let figures = [place.x_m, place.y_m, place.heading_rad];
+            figures.iter().chain(place.covariance.iter().flatten()).all(number)
+                && (0..3).all(|i| place.covariance[i][i] >= 0.0)
+        });
+        self.expect(fine, "/fix/places", "out_of_range", "poses in metres and radians");
+        let fine = fix.landmarks_m.len() <= FIX_MATCHED_MAX
+            && fix.landmarks_m.iter().flatten().all(number);
+        self.expect(fine, "/fix/landmarks_m", "out_of_range", "at most 1024 places in metres");
+        let fine = fix.segments.len() <= FIX_MATCHED_MAX
+            && fix.segments.iter().all(|id| parse_feature_id(id).is_some());
+        self.expect(fine, "/fix/segments", "bad_id", "at most 1024 ids of segments");
     }
 
     /// An instant, if there is one and it is one.
@@ -139,6 +173,9 @@ pub(super) fn robot_update(update: &RobotUpdate) -> Result<(), ApiError> {
     {
         let fine = figure.is_none_or(|f| f >= 0);
         findings.expect(fine, pointer, "out_of_range", "a whole number, 0 or more");
+    }
+    if let Some(fix) = &update.fix {
+        findings.fix(fix);
     }
     findings.done()
 }

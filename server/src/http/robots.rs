@@ -60,8 +60,8 @@ pub(super) async fn describe(
     reader.small(&found.ok_or_else(|| ApiError::not_found("robot", robot))?)
 }
 
-/// Changes a robot: what is absent stays. A robot may report its own `revision` and
-/// `queue_length`; all else needs `admin`.
+/// Changes a robot: what is absent stays. A robot may report its own `revision`,
+/// `queue_length` and `fix`; all else needs `admin`.
 #[utoipa::path(
     patch, path = route::ROBOT, operation_id = "update_robot", tag = "robots",
     params(("site" = String, Path), ("robot" = String, Path)), request_body = RobotUpdate,
@@ -85,7 +85,7 @@ fn may_update(
     robot: &str,
     update: &RobotUpdate,
 ) -> Result<(), ApiError> {
-    let RobotUpdate { name, sensors, state, revision: _, queue_length: _ } = update;
+    let RobotUpdate { name, sensors, state, revision: _, queue_length: _, fix: _ } = update;
     if !site.caller.speaks_for(robot) {
         return Err(ApiError::OtherRobot { own: site.caller.robot.clone().unwrap_or_default() });
     }

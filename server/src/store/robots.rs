@@ -15,7 +15,7 @@ const TABLE: &str = "robots";
 macro_rules! columns {
     () => {
         "robot, name, sensors, state, reported_revision, queue_length, contributions, reverted, last_level, \
-         last_x_m, last_y_m, last_heading_rad, last_covariance, last_observed_at_us"
+         last_x_m, last_y_m, last_heading_rad, last_covariance, last_observed_at_us, fix"
     };
 }
 
@@ -101,10 +101,12 @@ impl Store {
         update: &v1::RobotUpdate,
     ) -> Result<Option<v1::RobotDescription>, StoreError> {
         let sensors = update.sensors.as_deref().map(sensors_text).transpose()?;
+        let fix = update.fix.as_ref().map(serde_json::to_string).transpose();
+        let fix = fix.map_err(|e| corrupt(TABLE, "fix", e))?;
         sqlx::query(concat!(
             "update robots set name = coalesce($3, name), sensors = coalesce($4, sensors), \
              state = coalesce($5, state), reported_revision = coalesce($6, reported_revision), \
-             queue_length = coalesce($7, queue_length) where site = $1 and robot = $2 returning ",
+             queue_length = coalesce($7, queue_length), fix = coalesce($8, fix) where site = $1 and robot = $2 returning ",
             columns!()
         ))
         .bind(site)
@@ -114,6 +116,7 @@ impl Store {
         .bind(update.state.map(state_text))
         .bind(update.revision)
         .bind(update.queue_length)
+        .bind(fix)
         .fetch_optional(self.writes())
         .await?
         .map(|row| describe(&row))
@@ -146,6 +149,7 @@ fn describe(row: &AnyRow) -> Result<v1::RobotDescription, StoreError> {
     let sensors: String = get(row, TABLE, "sensors")?;
     let sensors: Vec<v1::SensorProfile> =
         serde_json::from_str(&sensors).map_err(|e| corrupt(TABLE, "sensors", e))?;
+    let fix: Option<String> = get(row, TABLE, "fix")?;
     let kinds: BTreeSet<v1::SensorKind> = sensors.iter().map(|sensor| sensor.kind).collect();
     Ok(v1::RobotDescription {
         robot: get(row, TABLE, "robot")?,
@@ -156,6 +160,10 @@ fn describe(row: &AnyRow) -> Result<v1::RobotDescription, StoreError> {
         last_pose: last_pose(row)?,
         revision: get(row, TABLE, "reported_revision")?,
         queue_length: get(row, TABLE, "queue_length")?,
+        fix: fix
+            .map(|text| serde_json::from_str(&text))
+            .transpose()
+            .map_err(|e| corrupt(TABLE, "fix", e))?,
         contributions: get(row, TABLE, "contributions")?,
         reverted: get(row, TABLE, "reverted")?,
     })

@@ -79,6 +79,7 @@ fn look(base: Contribution) -> Contribution {
             heading_rad: 0.0,
             covariance: variances,
             provenance: Provenance::Datum,
+            basis: None,
         },
         segments: vec![],
         clusters: vec![ObservedCluster {

@@ -51,6 +51,7 @@ async fn contribute(floor: &Level, robot: &str, number: u64) {
             heading_rad: 0.0,
             covariance: [[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-6]],
             provenance: Provenance::Datum,
+            basis: None,
         },
         segments: walls(),
         clusters: vec![],

@@ -100,6 +100,7 @@ fn look(numbers: &mut Numbers, i: usize) -> v1::Contribution {
             heading_rad: heading,
             covariance: [[4e-4, 1e-5, 0.0], [1e-5, 4e-4, 0.0], [0.0, 0.0, 1e-5]],
             provenance: [v1::Provenance::Datum, v1::Provenance::SharedMap][i % 2],
+            basis: None,
         },
         segments: if sonar { Vec::new() } else { segments(numbers, at, heading) },
         clusters: if i.is_multiple_of(4) { vec![cluster(numbers)] } else { Vec::new() },

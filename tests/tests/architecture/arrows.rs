@@ -100,13 +100,22 @@ const MODULES: &[(&str, &[ModuleRule])] = &[
             ("log", &["sensor"]),
             ("sync", &[]),
             ("geojson", &["perception"]),
-            ("robot", &["emulation", "evidence", "log", "perception", "sensor"]),
+            ("odometry", &[]),
             // Of emulation its chance only, for unit tests.
+            ("localization", &["emulation::Chance", "perception", "odometry", "sensor"]),
             (
-                "localization",
-                &["emulation::Chance", "perception", "robot::OdometryNoise", "sensor"],
+                "robot",
+                &[
+                    "emulation",
+                    "evidence",
+                    "localization",
+                    "log",
+                    "odometry",
+                    "perception",
+                    "sensor",
+                ],
             ),
-            ("replay", &["log", "robot", "sensor", "sync"]),
+            ("replay", &["localization", "log", "robot", "sensor", "sync"]),
             (
                 "cli",
                 &[

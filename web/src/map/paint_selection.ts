@@ -61,13 +61,19 @@ export function paintSelection(frame: Frame, state: State, theme: Theme): void {
   }
 }
 
-function paintSegmentHalo(frame: Frame, segment: Segment): void {
+/** Adds the solid pieces of a segment to the pen's path. */
+export function tracePieces(frame: Frame, segment: Segment): void {
   const { pen } = frame;
-  pen.beginPath();
   for (const [x0, y0, x1, y1] of piecesOf(segment)) {
     pen.moveTo(xScreenFromLevel(frame, x0), yScreenFromLevel(frame, y0));
     pen.lineTo(xScreenFromLevel(frame, x1), yScreenFromLevel(frame, y1));
   }
+}
+
+function paintSegmentHalo(frame: Frame, segment: Segment): void {
+  const { pen } = frame;
+  pen.beginPath();
+  tracePieces(frame, segment);
   // The normal points away from the level's origin.
   const [x, y] = pointOnLine(segment, middleOf(segment));
   const towards = segment.facing === "away" ? 1 : -1;

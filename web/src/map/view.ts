@@ -26,6 +26,7 @@ import { paintChains } from "./paint_chains";
 import { paintChanges } from "./paint_changes";
 import { paintClusters } from "./paint_clusters";
 import { paintEditing } from "./paint_editing";
+import { paintFixes } from "./paint_fixes";
 import { paintGrid } from "./paint_grid";
 import { paintLandmarks } from "./paint_landmarks";
 import { paintModel } from "./paint_model";
@@ -138,6 +139,7 @@ export function createMapView(options: MapViewOptions): MapView {
       piecesPainted = paintSegments(frame, batches(state.content.segments, state.slots), theme());
     },
     robots: (frame) => {
+      paintFixes(frame, state, theme());
       const marks = robotsHere(state).map((robot) => ({
         robot,
         slot: state.slots.get(robot.robot) ?? 0,

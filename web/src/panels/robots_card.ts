@@ -3,7 +3,7 @@
 import { competenceInWords } from "../competence";
 import { el, keyed, setShown, setText, swatch, type Row } from "../dom";
 import { strokeOf, strokeOfSeveral, type Theme } from "../palette";
-import { isHere, isSilent, type State } from "../state";
+import { fixHere, isHere, isSilent, type State } from "../state";
 import type { Store } from "../store";
 import { ago, count, counted } from "../words";
 import type { RobotDescription } from "../wire";
@@ -76,6 +76,9 @@ function createRow(slug: string, { store, theme }: { store: Store; theme: () => 
 function whenInWords(state: State, robot: RobotDescription, silent: boolean): string {
   if (robot.state === "held") return "held";
   if (robot.last_pose != null && !isHere(state, robot)) return `on level ${robot.last_pose.level}`;
+  const fix = fixHere(state, robot);
+  if (fix?.kind === "ambiguous") return "not sure where it is";
+  if (fix?.kind === "no_match") return "lost";
   const heardAtMs = state.heardAtMs.get(robot.robot);
   if (heardAtMs === undefined) return robot.contributions === 0 ? "not heard yet" : "offline";
   return silent ? `offline · ${ago(heardAtMs, state.nowMs)}` : ago(heardAtMs, state.nowMs);

@@ -4,9 +4,9 @@ import { competenceInWords } from "../competence";
 import { angleSd, areaOf, edgesOf, ellipse95, leastExistence, lengthOf, middleOf, offsetSd } from "../geometry";
 import { el, setShown, setText } from "../dom";
 import { LANDMARK_WORDS } from "../model";
-import { isSilent, type State } from "../state";
+import { fixHere, isSilent, type State } from "../state";
 import type { Store } from "../store";
-import type { Chain, Cluster, EndKind, Landmark, RobotDescription, Segment } from "../wire";
+import type { Chain, Cluster, EndKind, Landmark, RobotDescription, RobotFix, Segment } from "../wire";
 import { ago, coordinate, count, counted, degrees, fixed, instant, lengthInWords, likelihood, listed } from "../words";
 
 /** A card's title and its lines. */
@@ -174,9 +174,31 @@ function describeRobot(robot: RobotDescription, state: State): Description {
       ["Seen at", `${instant(pose.observed_at)} by its clock`],
     );
   }
+  const fix = fixHere(state, robot);
+  if (fix !== null) lines.push(["Place", fixInWords(fix)]);
   if (robot.revision != null) lines.push(["Runs revision", count(robot.revision)]);
   if (robot.queue_length != null) lines.push(["Waiting to send", count(robot.queue_length)]);
   return { title: robot.name, lines };
+}
+
+/** What a robot knows of its place, in words. */
+export function fixInWords(fix: RobotFix): string {
+  const matched = [
+    counted((fix.segments ?? []).length, "wall"),
+    ...((fix.landmarks_m ?? []).length > 0 ? [counted((fix.landmarks_m ?? []).length, "landmark")] : []),
+  ].join(" and ");
+  switch (fix.kind) {
+    case "unique":
+      return "found just now, no other fits";
+    case "tracked":
+      return `tracked, last look matched with ${matched}`;
+    case "ambiguous":
+      return fix.places.length > 0
+        ? `not sure: ${counted(fix.places.length, "place")} may be it`
+        : "not sure: too many places may be it";
+    case "no_match":
+      return "lost: nothing on the map fits what it sees";
+  }
 }
 
 export function createSelectionCard(parent: HTMLElement, store: Store): (state: State) => void {

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 
 use super::*;
 use crate::emulation::Chance;
-use crate::robot::OdometryNoise;
+use crate::odometry::OdometryNoise;
 
 /// A step with the wheels' errors: what they count is exact, where the robot goes is not.
 fn slipped(
