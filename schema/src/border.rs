@@ -1,5 +1,6 @@
 //! The way in: wire types are checked here, once, and become `mapfold_map` types.
 
+pub mod alignment;
 mod chains;
 pub mod changes;
 mod contribution;

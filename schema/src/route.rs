@@ -56,6 +56,10 @@ pub const LANDMARKS: &str = "/api/v1/sites/{site}/levels/{level}/landmarks";
 pub const CHANGES: &str = "/api/v1/sites/{site}/levels/{level}/changes";
 /// `POST`: what is made of one of them.
 pub const CHANGE: &str = "/api/v1/sites/{site}/levels/{level}/changes/{id}";
+/// `GET`: robots' own frames, and where they lie on the level.
+pub const ALIGNMENTS: &str = "/api/v1/sites/{site}/levels/{level}/alignments";
+/// `POST, DELETE`: accept where one of them lies, or withdraw that.
+pub const ALIGNMENT: &str = "/api/v1/sites/{site}/levels/{level}/alignments/{frame}";
 /// `GET, PUT`: the library of a site.
 pub const PROTOTYPES: &str = "/api/v1/sites/{site}/prototypes";
 /// `GET`: exports.

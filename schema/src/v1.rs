@@ -1,5 +1,6 @@
 //! The types of `/api/v1`. Metres, radians; instants are RFC 3339 in UTC; ids are UUIDs.
 
+mod alignment;
 mod building;
 mod contribution;
 mod event;
@@ -21,6 +22,10 @@ mod session;
 mod site;
 mod token;
 
+pub use alignment::{
+    Alignment, AlignmentCandidate, AlignmentDoubt, Alignments, FramePose, NewAlignment,
+    UnalignedFrame,
+};
 pub use building::{BuildingImport, BuildingReport};
 pub use contribution::{
     Contribution, ContributionEntry, ContributionPage, ContributionRecord, ContributionState,

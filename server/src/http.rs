@@ -9,6 +9,7 @@
 //! * One file per resource, with thin handlers.
 
 mod access;
+mod alignments;
 mod answer;
 mod batch;
 mod body;

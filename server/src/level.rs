@@ -7,6 +7,7 @@
 //! fails here, the level is dropped and read back. Knows the store and the map, not HTTP.
 
 mod accept;
+pub mod alignments;
 mod append;
 pub mod changes;
 mod fold;
@@ -46,6 +47,7 @@ pub use snapshot::Snapshot;
 
 use crate::store::levels::LevelRow;
 use crate::store::{Store, StoreError};
+use alignments::AlignmentCache;
 use append::Waiting;
 use changes::ChangeCache;
 use gdb::ModelCache;
@@ -114,6 +116,8 @@ struct Shared {
     models: ModelCache,
     /// What the map says against them.
     changes: ChangeCache,
+    /// Where robots' own frames seem to lie.
+    alignments: AlignmentCache,
     /// Landmarks that the map teaches.
     learned: LearnedCache,
     store: Store,

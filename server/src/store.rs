@@ -6,6 +6,7 @@
 //! * [`sites`], [`levels`], [`robots`], [`tokens`]: what people set up.
 //! * [`contributions`]: the append to a level's log, the one path to an acknowledgement.
 //! * [`acts`]: what operators did to a log; [`revision_list`]: the columns that say to what.
+//! * [`alignments`]: where robots' own frames lie, in a log.
 //! * [`imports`]: maps of other programs in a log, and what they say.
 //! * [`gdb`]: the a-priori model in a log; [`library`]: the prototypes of a site.
 //! * [`dismissals`]: what operators do not want to be told of any more.
@@ -13,6 +14,7 @@
 //! * [`map_rows`]: the folded map, written behind; [`tile_cells`]: the column that holds a tile.
 
 pub mod acts;
+pub mod alignments;
 pub mod contributions;
 pub mod dismissals;
 pub mod gdb;

@@ -76,6 +76,56 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/sites/{site}/levels/{level}/alignments": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Robots' own frames: those of which contributions are held, with the poses at which their maps fit the level's; and the
+         *     alignments in the log.
+         * @description A robot that does not know where it is contributes with the provenance `own_map`, in a `frame` of its own; that
+         *     is held. Its map is held against the level's both ways; a pose is certain if the maps agree where both know,
+         *     share enough wall in enough directions, and no other pose comes near it. By rule a frame is then
+         *     aligned without being asked for, once 16 of its contributions are held, and later ones of it follow. Working a proposal out may take
+         *     seconds.
+         */
+        get: operations["read_alignments"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/sites/{site}/levels/{level}/alignments/{frame}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Accepts where a robot's own frame lies: what is held of it goes into the map there. Needs `map:edit`.
+         * @description At the pose that is named, or, without one, where it is certain to lie. An entry of the log with a revision of its own;
+         *     the map follows like after an upload, and can be had back by `DELETE`.
+         */
+        post: operations["align"];
+        /**
+         * Withdraws the alignments of a frame: the map is then bit for bit what it would have been without them, and its
+         *     contributions are held again. Needs `map:edit`.
+         */
+        delete: operations["withdraw_alignment"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/sites/{site}/levels/{level}/changes": {
         parameters: {
             query?: never;
@@ -747,6 +797,84 @@ export interface paths {
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
+        /** @description An alignment in the log: contributions of a frame are folded at a pose. */
+        Alignment: {
+            /** @description When it was accepted. */
+            at: string;
+            /** @description Public id of the token that accepted it; `rule` if the server did by itself. */
+            author: string;
+            /** @description In the author's words. */
+            comment: string;
+            /**
+             * Format: int32
+             * @description Contributions that it put into the map.
+             */
+            contributions: number;
+            /**
+             * Format: uuid
+             * @description The frame.
+             */
+            frame: string;
+            /** @description Where it lies. */
+            pose: components["schemas"]["FramePose"];
+            /**
+             * Format: int64
+             * @description Its place in the level's log.
+             */
+            revision: number;
+            /**
+             * Format: int64
+             * @description Revision of the entry that withdrew it; absent while it stands.
+             */
+            withdrawn?: number | null;
+        };
+        /** @description A pose that a robot's map may have on the level, and what speaks for it. */
+        AlignmentCandidate: {
+            /**
+             * Format: double
+             * @description Wall on which both maps agree, counted on both of them together.
+             */
+            agreed_m: number;
+            /**
+             * Format: double
+             * @description Wall of either map where the other is free.
+             */
+            conflicting_m: number;
+            /**
+             * Format: int32
+             * @description Landmarks of the robot's map that the level has too.
+             */
+            landmarks: number;
+            /**
+             * Format: double
+             * @description Share of the walls of the robot's map that lie where the level knows something.
+             */
+            overlap: number;
+            /** @description The pose. */
+            pose: components["schemas"]["FramePose"];
+            /**
+             * Format: double
+             * @description Root mean square distance of walls that agree.
+             */
+            residual_m: number;
+        };
+        /**
+         * @description What speaks against a proposed alignment.
+         * @enum {string}
+         */
+        AlignmentDoubt: "little_overlap" | "conflict" | "few_landmarks" | "loose" | "runner_up";
+        /** @description Frames of robots on a level. */
+        Alignments: {
+            /** @description Alignments in the log, newest first, 100 at most. */
+            alignments: components["schemas"]["Alignment"][];
+            /**
+             * Format: int64
+             * @description Revision of the map that frames were held against.
+             */
+            revision: number;
+            /** @description Frames of which contributions are held. */
+            unaligned: components["schemas"]["UnalignedFrame"][];
+        };
         /** @description A rectangle of the level frame. */
         Bounds: {
             /**
@@ -922,7 +1050,8 @@ export interface components {
             evidence?: components["schemas"]["EvidencePatch"][];
             /**
              * Format: uuid
-             * @description UUID of the level frame that the pose and the evidence are in.
+             * @description UUID of the frame that the pose and the evidence are in: the level's; or, of a robot that does not know
+             *     where it is, one of its own (see `own_map`).
              */
             frame: string;
             /**
@@ -948,6 +1077,11 @@ export interface components {
             clusters: number;
             /** @description Whether its readings were emulated. */
             emulated: boolean;
+            /**
+             * Format: uuid
+             * @description The robot's own frame that the pose is in; absent if it is the level's.
+             */
+            frame?: string | null;
             /**
              * Format: uuid
              * @description The contribution.
@@ -1130,6 +1264,26 @@ export interface components {
             /**
              * Format: double
              * @description Heading.
+             */
+            heading_rad: number;
+            /**
+             * Format: double
+             * @description Position, x.
+             */
+            x_m: number;
+            /**
+             * Format: double
+             * @description Position, y.
+             */
+            y_m: number;
+        };
+        /** @description `level_from_odom`: where the origin of a robot's own frame lies on the level. */
+        FramePose: {
+            /** @description Covariance of (x, y, heading), row by row. */
+            covariance: number[][];
+            /**
+             * Format: double
+             * @description Heading, counter-clockwise from x.
              */
             heading_rad: number;
             /**
@@ -1988,6 +2142,12 @@ export interface components {
              */
             y_m: number;
         };
+        /** @description An alignment to be accepted. */
+        NewAlignment: {
+            /** @description What for, at most 500 bytes. */
+            comment?: string;
+            pose?: components["schemas"]["FramePose"] | null;
+        };
         /** @description A level to be made. */
         NewLevel: {
             /**
@@ -2328,7 +2488,7 @@ export interface components {
          * @description Where a pose comes from.
          * @enum {string}
          */
-        Provenance: "datum" | "shared_map" | "odometry";
+        Provenance: "datum" | "shared_map" | "odometry" | "own_map";
         /**
          * @description How the readings of one scanner err, measured on a flat target: reading = distance + bias +
          *     noise, bias and noise depending on the distance and on the incidence, which is the angle between
@@ -2807,6 +2967,32 @@ export interface components {
              */
             y: number;
         };
+        /** @description A frame of which contributions are held, and where they seem to belong. */
+        UnalignedFrame: {
+            /** @description Poses, best first; none if nothing on the level resembles the robot's map. */
+            candidates: components["schemas"]["AlignmentCandidate"][];
+            /**
+             * Format: int32
+             * @description Contributions that are held.
+             */
+            contributions: number;
+            /** @description What speaks against the first candidate. */
+            doubts: components["schemas"]["AlignmentDoubt"][];
+            /**
+             * Format: uuid
+             * @description UUID of the frame.
+             */
+            frame: string;
+            /** @description Whether the first candidate may be believed. */
+            is_certain: boolean;
+            /** @description Who contributed in it. */
+            robots: string[];
+            /**
+             * Format: double
+             * @description What the second candidate comes to, as a share of the first.
+             */
+            runner_up: number;
+        };
         /** @description How a revert was undone. */
         Undone: {
             /** @description When the server took it. */
@@ -3157,6 +3343,142 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_alignments: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Frames, and alignments */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Alignments"];
+                };
+            };
+            /** @description Not modified: `If-None-Match` has the `ETag` of what would be answered */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    align: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+                frame: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NewAlignment"];
+            };
+        };
+        responses: {
+            /** @description It is aligned */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Alignment"];
+                };
+            };
+            /** @description `nothing_held`: nothing of this frame is held; `frame_aligned`: it lies elsewhere, withdraw that first; `alignment_uncertain`: name the pose */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description `body_invalid`, with `errors` */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Refused; `code` says why */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    withdraw_alignment: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                site: string;
+                level: string;
+                frame: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The frame's alignments, withdrawn */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Alignment"][];
+                };
+            };
+            /** @description `frame_not_aligned`; `frame_reverted`: contributions of it are reverted, undo that first */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description Refused; `code` says why */
             default: {

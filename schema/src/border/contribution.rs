@@ -181,7 +181,15 @@ fn check_identity(contribution: &v1::Contribution, target: &Target, wrong: &mut 
             "a robot's name is 1 to 64 lower-case letters, digits and inner hyphens",
         );
     }
-    if contribution.frame != target.frame {
+    let is_own = contribution.pose.provenance == v1::Provenance::OwnMap;
+    if is_own && contribution.frame == target.frame {
+        wrong.add(
+            &root.field("frame"),
+            "frame_mismatch",
+            "this is the frame of the level: a robot's own map has a frame of its own",
+        );
+    }
+    if !is_own && contribution.frame != target.frame {
         wrong.add(
             &root.field("frame"),
             "frame_mismatch",

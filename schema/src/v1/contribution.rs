@@ -14,7 +14,8 @@ pub struct Contribution {
     pub id: Uuid,
     /// The robot's slug.
     pub robot: String,
-    /// UUID of the level frame that the pose and the evidence are in.
+    /// UUID of the frame that the pose and the evidence are in: the level's; or, of a robot that does not know
+    /// where it is, one of its own (see `own_map`).
     pub frame: Uuid,
     /// When it was seen, by the robot's clock, RFC 3339.
     pub observed_at: String,
@@ -80,6 +81,9 @@ pub enum Provenance {
     SharedMap,
     /// Odometry since the last fix.
     Odometry,
+    /// The robot's own map: pose and evidence are in `frame`, a frame of the robot's own, and are held until
+    /// it is known where on the level that lies.
+    OwnMap,
 }
 
 /// A straight piece of wall as one look saw it, in the robot frame.
@@ -191,6 +195,9 @@ pub struct ContributionEntry {
     pub tiles: u32,
     /// Where the robot was: [x, y, heading].
     pub pose: [f64; 3],
+    /// The robot's own frame that the pose is in; absent if it is the level's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame: Option<Uuid>,
     /// What has become of it.
     pub state: ContributionState,
 }

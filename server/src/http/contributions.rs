@@ -113,7 +113,17 @@ pub(super) async fn upload(
     let is_long = upload.bytes.len() > LONG_BODY_BYTES;
     let judge = move || judge(&upload, &caller, &target, received_at_us);
     let judged = if is_long { blocking(judge).await? } else { judge()? };
+    let frames: Vec<Uuid> = judged.items.iter().flatten().filter_map(Accepted::own_frame).collect();
     let answers = submit(&level, judged.items).await;
+    if !frames.is_empty() {
+        let level = level.level.clone();
+        // The robot need not wait until it is known where it is.
+        tokio::spawn(async move {
+            if let Err(error) = level.follow_rule(&frames, received_at_us).await {
+                tracing::warn!(site = level.site(), level = level.level(), %error, "alignment failed");
+            }
+        });
+    }
     answer(&level, &reader, answers, judged.is_array)
 }
 

@@ -10,9 +10,9 @@ use utoipa::{Modify, OpenApi as _};
 use super::access::SESSION_COOKIE;
 use super::problem::ApiError;
 use super::{
-    batch, changes, contributions, events, exports, gdb, health, imports, landmarks, levels,
-    model_exports, patches, plan, prototypes, raster, reverts, robots, session, sites, tiles,
-    vector,
+    alignments, batch, changes, contributions, events, exports, gdb, health, imports, landmarks,
+    levels, model_exports, patches, plan, prototypes, raster, reverts, robots, session, sites,
+    tiles, vector,
 };
 
 /// What stands at the head of the description.
@@ -39,6 +39,7 @@ const TAGS_WITH_VALIDATORS: [&str; 6] =
         robots::list, robots::enrol, robots::describe, robots::update, robots::issue_token,
         contributions::upload, contributions::list, contributions::describe,
         reverts::create, reverts::list, reverts::describe, reverts::undo,
+        alignments::read, alignments::accept, alignments::withdraw,
         vector::read, raster::changes, raster::tile, batch::read, tiles::read, patches::read,
         events::follow, exports::read, imports::create, imports::list, imports::remove,
         gdb::read, gdb::replace, gdb::edit, gdb::publish, gdb::entries,

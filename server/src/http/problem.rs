@@ -15,11 +15,13 @@ use mapfold_schema::v1::Scope;
 use crate::exchange::building::BuildingError;
 use crate::exchange::incoming::FileFault;
 use crate::exchange::nav2::{ImportError, Nav2Error};
+use crate::level::alignments::AlignmentError;
 use crate::level::changes::NotAcceptable;
 use crate::level::learned::LearnedError;
 use crate::level::{LevelError, RevertError, SinceError, SubmitError};
 use crate::store::StoreError;
 use crate::store::acts::RevertRefusal;
+use crate::store::alignments::AlignmentRefusal;
 use crate::store::payload::PayloadError;
 use gdb::GdbRefusal;
 
@@ -76,6 +78,8 @@ pub(super) enum ApiError {
     Submit(SubmitError),
     /// Contributions were not taken out or put back.
     Revert(RevertError),
+    /// A frame was not aligned, or an alignment not withdrawn.
+    Align(AlignmentError),
     /// A revision that the map has not reached.
     Since(SinceError),
     /// Nobody knows any more what landmarks a reader was told.
@@ -126,6 +130,15 @@ impl From<RevertError> for ApiError {
         match error {
             RevertError::Store(error) => Self::Store(error),
             other => Self::Revert(other),
+        }
+    }
+}
+
+impl From<AlignmentError> for ApiError {
+    fn from(error: AlignmentError) -> Self {
+        match error {
+            AlignmentError::Store(error) => Self::Store(error),
+            other => Self::Align(other),
         }
     }
 }
@@ -210,6 +223,7 @@ impl ApiError {
             Self::Closing => of(503, "closing", "The server is about to stop."),
             Self::Submit(error) => unacknowledged(error),
             Self::Revert(error) => unreverted(error),
+            Self::Align(error) => unaligned(error),
             Self::Since(error) => ahead(error),
             Self::Forgotten { since } => {
                 let detail = format!(
@@ -341,6 +355,23 @@ fn unreverted(error: &RevertError) -> Problem {
         RevertError::Overtaken => of(409, "map_moved_on", detail),
         RevertError::Behind { .. } => of(503, "revision_not_reached", detail),
         RevertError::Store(error) => of_store(error),
+    }
+}
+
+fn unaligned(error: &AlignmentError) -> Problem {
+    let detail = error.to_string();
+    match error {
+        AlignmentError::Refused(AlignmentRefusal::NothingHeld) => of(409, "nothing_held", detail),
+        AlignmentError::Refused(AlignmentRefusal::Aligned(_)) => of(409, "frame_aligned", detail),
+        AlignmentError::Refused(AlignmentRefusal::NotAligned) => {
+            of(409, "frame_not_aligned", detail)
+        }
+        AlignmentError::Refused(AlignmentRefusal::Reverted(_)) => of(409, "frame_reverted", detail),
+        AlignmentError::Refused(AlignmentRefusal::TooMany(_)) => {
+            of(413, "too_many_contributions", detail)
+        }
+        AlignmentError::Uncertain => of(409, "alignment_uncertain", detail),
+        AlignmentError::Store(error) => of_store(error),
     }
 }
 

@@ -8,9 +8,9 @@ use mapfold_schema::route;
 use super::problem::ApiError;
 use super::state::App;
 use super::{
-    batch, changes, contributions, docs, events, exports, gdb, health, imports, landmarks, layers,
-    levels, model_exports, page, patches, plan, prototypes, raster, reverts, robots, session,
-    sites, tiles, vector,
+    alignments, batch, changes, contributions, docs, events, exports, gdb, health, imports,
+    landmarks, layers, levels, model_exports, page, patches, plan, prototypes, raster, reverts,
+    robots, session, sites, tiles, vector,
 };
 
 /// All routes, with all layers around them.
@@ -32,6 +32,8 @@ pub fn router(app: &App) -> Router {
         .route(route::CONTRIBUTION, get(contributions::describe))
         .route(route::REVERTS, get(reverts::list).post(reverts::create))
         .route(route::REVERT, get(reverts::describe).delete(reverts::undo))
+        .route(route::ALIGNMENTS, get(alignments::read))
+        .route(route::ALIGNMENT, post(alignments::accept).delete(alignments::withdraw))
         .route(route::VECTOR, get(vector::read))
         .route(route::RASTER, get(raster::changes))
         .route(route::RASTER_BATCH, get(batch::read))

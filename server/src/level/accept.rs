@@ -5,6 +5,7 @@ use std::sync::Arc;
 use mapfold_map::level::Contribution;
 use mapfold_schema::digest::content_digest;
 use mapfold_schema::v1;
+use uuid::Uuid;
 
 use crate::store::contributions::NewContribution;
 use crate::store::payload::{self, PayloadError};
@@ -37,11 +38,17 @@ impl Accepted {
             segment_count: count(wire.segments.len()),
             cluster_count: count(wire.clusters.len()),
             tile_count: count(wire.evidence.iter().map(|patch| patch.tiles.len()).sum()),
+            frame: (wire.pose.provenance == v1::Provenance::OwnMap).then_some(wire.frame),
             pose: [wire.pose.x_m, wire.pose.y_m, wire.pose.heading_rad],
             pose_covariance: wire.pose.covariance,
             payload: payload::split(wire)?,
         };
         Ok(Self { row, checked: Arc::new(as_received(checked, received_at_us)) })
+    }
+
+    /// The robot's own frame that it is in; none if that is the level's.
+    pub fn own_frame(&self) -> Option<Uuid> {
+        self.row.frame
     }
 }
 

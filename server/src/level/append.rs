@@ -163,6 +163,7 @@ fn outcome(row: &NewContribution, appended: Appended) -> Result<v1::Receipt, Sub
         received_at: to_rfc3339(received_at_us),
         // As it was when it was taken, so that the receipt stays the same.
         state: match state {
+            _ if row.frame.is_some() => v1::ContributionState::Held,
             v1::ContributionState::Held => v1::ContributionState::Held,
             v1::ContributionState::Folded | v1::ContributionState::Reverted => {
                 v1::ContributionState::Folded

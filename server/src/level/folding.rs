@@ -5,14 +5,12 @@
 //! merges into another must leave a tombstone on every replica and after every restart, because
 //! some reader may have seen it.
 
-use std::collections::BTreeSet;
-
 use mapfold_map::level::{Batch, Changes, Level, LevelConfig, Misplaced};
 use mapfold_map::raster::{SliceKey, Tile};
 
 use super::history::{ChangeCounts, MapHistory};
 use super::recall::{Entry, Logged};
-use crate::store::acts::ActKind;
+use crate::store::acts::{ActKind, Force};
 
 /// An entry that cannot be the next one of the log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -59,16 +57,15 @@ impl Folding {
     }
 
     /// A level at `revision`, from the evidence stored then and the contributions up to then
-    /// (without their evidence), but for those whose revisions are `out`. Its history is still to
-    /// be filled in.
+    /// (without their evidence), as far as they are in force. Its history is still to be filled in.
     pub(super) fn restored(
         config: &LevelConfig,
         revision: i64,
         sums: impl IntoIterator<Item = (SliceKey, Tile)>,
         log: &[Logged],
-        out: &BTreeSet<i64>,
+        force: &Force,
     ) -> Self {
-        let in_force = log.iter().filter(|logged| !logged.held && !out.contains(&logged.revision));
+        let in_force = log.iter().filter(|logged| force.has(logged.revision, logged.held));
         let level = Level::restore(*config, sums, in_force.map(|logged| &*logged.contribution));
         let contributions = log.len() as i64;
         Self { level, history: MapHistory::default(), revision, contributions }
@@ -127,8 +124,8 @@ impl Folding {
         };
         let seen = look(self, &changes);
         let opposite = match kind {
-            ActKind::Revert => ActKind::Restore,
-            ActKind::Restore => ActKind::Revert,
+            ActKind::Revert | ActKind::Withdraw => ActKind::Restore,
+            ActKind::Restore | ActKind::Align => ActKind::Revert,
         };
         let back = move_batch(&mut self.level, opposite, moved).map_err(|Misplaced(_)| Spoilt)?;
         let as_before =
@@ -175,7 +172,7 @@ pub(super) struct Spoilt;
 
 fn move_batch(level: &mut Level, kind: ActKind, moved: &Batch) -> Result<Changes, Misplaced> {
     match kind {
-        ActKind::Revert => level.unfold_batch(moved),
-        ActKind::Restore => level.fold_batch(moved),
+        ActKind::Revert | ActKind::Withdraw => level.unfold_batch(moved),
+        ActKind::Restore | ActKind::Align => level.fold_batch(moved),
     }
 }

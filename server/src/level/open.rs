@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use mapfold_map::level::LevelConfig;
 use mapfold_map::raster::{SliceKey, Tile, TileKey};
-use mapfold_schema::border::{Target, parse_chain_id, parse_feature_id};
+use mapfold_schema::border::{parse_chain_id, parse_feature_id};
 
 use super::folding::Folding;
 use super::history::{History, Least, MapHistory};
@@ -15,7 +15,7 @@ use super::prior;
 use super::recall::{self, Logged};
 use super::rows;
 use super::walls;
-use crate::store::acts::out_after;
+use crate::store::acts::Force;
 use crate::store::levels::LevelRow;
 use crate::store::map_rows::{FeatureRow, MapRows, StoredMap, TileRow};
 use crate::store::{Store, StoreError, tile_cells};
@@ -40,9 +40,8 @@ pub(super) async fn open(
 ) -> Result<Option<Opened>, StoreError> {
     let Some(row) = store.level(site, level).await? else { return Ok(None) };
     let Some(stored) = store.stored_map(site, level).await? else { return Ok(None) };
-    let target = recall::target(&row);
     let stored = Arc::new(stored);
-    let folding = match restore(store, &row, &target, &stored).await? {
+    let folding = match restore(store, &row, &stored).await? {
         Ok(folding) => catch_up(store, &row, folding).await?,
         Err(difference) => {
             tracing::error!(site, level, difference, "stored map is not its log's; folding again");
@@ -82,9 +81,11 @@ pub(super) async fn catch_up(
 async fn restore(
     store: &Store,
     row: &LevelRow,
-    target: &Target,
     stored: &Arc<StoredMap>,
 ) -> Result<Result<Box<Folding>, String>, StoreError> {
+    let until = stored.folded_revision;
+    let frames = store.frames_at(&row.site, &row.level, until).await?;
+    let reading = recall::Reading::new(row, frames);
     let mut log: Vec<Logged> = Vec::new();
     let mut after = 0;
     while after < stored.folded_revision {
@@ -93,11 +94,11 @@ async fn restore(
             .await?;
         let Some(last) = page.last() else { break };
         after = last.revision;
-        let target = *target;
+        let reading = reading.clone();
         log.extend(
             aside(move || {
                 page.iter()
-                    .map(|row| recall::features(row, &target))
+                    .map(|row| recall::features(row, &reading))
                     .collect::<Result<Vec<_>, StoreError>>()
             })
             .await?,
@@ -118,9 +119,9 @@ async fn restore(
         ));
     }
     let (config, stored) = (recall::config(row), Arc::clone(stored));
-    let out = out_after(&acts);
+    let force = Force::after(&acts);
     aside(move || {
-        let restored = restored_with_history(&config, &stored, &log, &out);
+        let restored = restored_with_history(&config, &stored, &log, &force);
         Ok(restored.map(|mut folding| {
             folding.history_mut().prior = prior;
             walls::tell(folding.history_mut(), config.resolution, stored.folded_revision);
@@ -134,7 +135,7 @@ fn restored_with_history(
     config: &LevelConfig,
     stored: &StoredMap,
     log: &[Logged],
-    out: &BTreeSet<i64>,
+    force: &Force,
 ) -> Result<Folding, String> {
     let rows = &stored.rows;
     let mut sums: Vec<(SliceKey, Tile)> = Vec::new();
@@ -144,7 +145,7 @@ fn restored_with_history(
             sums.push((row.at, tile));
         }
     }
-    let mut folding = Folding::restored(config, stored.folded_revision, sums, log, out);
+    let mut folding = Folding::restored(config, stored.folded_revision, sums, log, force);
     let map = folding.level().map().clone();
     let mut history = MapHistory::default();
     for row in &rows.slices {

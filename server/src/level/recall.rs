@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use mapfold_map::alignment::moved;
 use mapfold_map::level::{Batch, Contribution, LevelConfig};
 use mapfold_map::raster::SliceConfig;
 use mapfold_schema::border::{Limits, Target, Violation, check_contribution};
@@ -11,6 +12,7 @@ use super::accept::as_received;
 use super::open::{LOG_PAGE, aside};
 use super::prior::Imported;
 use crate::store::acts::{ActKind, ActRow};
+use crate::store::alignments::Frames;
 use crate::store::log::{FeaturesRow, LogRow};
 use crate::store::payload::{self, PayloadError};
 use crate::store::{Store, StoreError, levels::LevelRow};
@@ -28,15 +30,30 @@ const NO_LIMITS: Limits = Limits {
     batch_max: usize::MAX,
 };
 
+/// How rows of a log are read.
+#[derive(Debug, Clone)]
+pub(crate) struct Reading {
+    target: Target,
+    /// Where robots' own frames lay at the moment of the log for which it is read.
+    frames: Arc<Frames>,
+}
+
+impl Reading {
+    /// Of a level; contributions in a robot's own frame are told where `frames` knows of it, and as they are otherwise.
+    pub(crate) fn new(row: &LevelRow, frames: Frames) -> Self {
+        Self { target: target(row), frames: Arc::new(frames) }
+    }
+}
+
 /// A contribution with its place in the log.
 #[derive(Debug, Clone)]
 pub(crate) struct Logged {
     /// Its place.
     pub(crate) revision: i64,
     /// Whether it was kept out of the map when it came. One that was reverted was not: at its own
-    /// revision it was in the map.
+    /// revision it was in the map. One in a robot's own frame was, also if it was put in since.
     pub(crate) held: bool,
-    /// What it says.
+    /// What it says, on the level if it is known where its frame lies.
     pub(crate) contribution: Arc<Contribution>,
 }
 
@@ -96,8 +113,9 @@ pub(crate) async fn entries_after(
     if let Some(revision) = stretch.gdb.filter(|_| stretch.contributions.is_empty()) {
         return Ok(vec![Entry::Gdb(revision)]);
     }
-    let (rows, target) = (stretch.contributions, target(row));
-    let entry = move |row: &LogRow| whole(row, &target).map(Entry::Contribution);
+    // What is in a robot's own frame is held when it comes, wherever that lies.
+    let (rows, reading) = (stretch.contributions, Reading::new(row, Frames::new()));
+    let entry = move |row: &LogRow| whole(row, &reading).map(Entry::Contribution);
     aside(move || rows.iter().map(entry).collect()).await
 }
 
@@ -118,11 +136,11 @@ pub(crate) async fn imported(
 /// # Errors
 /// The store fails, or the log does not hold what was accepted.
 pub(crate) async fn gather(store: &Store, row: &LevelRow, act: &ActRow) -> Result<Act, StoreError> {
-    let moved = batch(store, row, &act.moved).await?;
+    let moved = batch(store, row, &act.moved, act.revision).await?;
     Ok(Act { revision: act.revision, kind: act.kind, moved })
 }
 
-/// Reads the contributions of these revisions, a few rows at a time.
+/// Reads the contributions of these revisions, a few rows at a time, as they are folded at revision `at` of the log.
 ///
 /// # Errors
 /// The store fails, or the log does not hold what was accepted.
@@ -130,8 +148,9 @@ pub(crate) async fn batch(
     store: &Store,
     row: &LevelRow,
     revisions: &[i64],
+    at: i64,
 ) -> Result<Batch, StoreError> {
-    let target = target(row);
+    let reading = Reading::new(row, store.frames_at(&row.site, &row.level, at).await?);
     let mut batch = Batch::new(&config(row));
     for piece in revisions.chunks(LOG_PAGE as usize) {
         let rows = store.log_rows(&row.site, &row.level, piece).await?;
@@ -142,9 +161,10 @@ pub(crate) async fn batch(
                 detail: format!("{} of {} are in the log", rows.len(), piece.len()),
             });
         }
+        let reading = reading.clone();
         batch = aside(move || {
             for row in &rows {
-                batch.add(Arc::unwrap_or_clone(whole(row, &target)?.contribution));
+                batch.add(Arc::unwrap_or_clone(whole(row, &reading)?.contribution));
             }
             Ok(batch)
         })
@@ -160,7 +180,7 @@ pub(crate) fn config(row: &LevelRow) -> LevelConfig {
 }
 
 /// What the contributions of a level were checked against, but for limits.
-pub(crate) fn target(row: &LevelRow) -> Target {
+fn target(row: &LevelRow) -> Target {
     Target { frame: row.frame, resolution_m: row.resolution_m, limits: NO_LIMITS }
 }
 
@@ -168,18 +188,18 @@ pub(crate) fn target(row: &LevelRow) -> Target {
 ///
 /// # Errors
 /// A row that does not hold what was accepted.
-pub(crate) fn whole(row: &LogRow, target: &Target) -> Result<Logged, StoreError> {
+pub(crate) fn whole(row: &LogRow, reading: &Reading) -> Result<Logged, StoreError> {
     let wire = payload::join(&row.payload.features, &row.payload.evidence);
-    logged(row.revision, row.state, row.received_at_us, wire, target)
+    logged(row.revision, row.state, row.received_at_us, wire, reading)
 }
 
 /// A row of the log without its evidence.
 ///
 /// # Errors
 /// A row that does not hold what was accepted.
-pub(crate) fn features(row: &FeaturesRow, target: &Target) -> Result<Logged, StoreError> {
+pub(crate) fn features(row: &FeaturesRow, reading: &Reading) -> Result<Logged, StoreError> {
     let wire = payload::without_evidence(&row.features);
-    logged(row.revision, row.state, row.received_at_us, wire, target)
+    logged(row.revision, row.state, row.received_at_us, wire, reading)
 }
 
 fn logged(
@@ -187,7 +207,7 @@ fn logged(
     state: ContributionState,
     received_at_us: i64,
     wire: Result<v1::Contribution, PayloadError>,
-    target: &Target,
+    reading: &Reading,
 ) -> Result<Logged, StoreError> {
     let corrupt = |detail: String| StoreError::Corrupt {
         table: "contributions",
@@ -195,12 +215,18 @@ fn logged(
         detail,
     };
     let wire = wire.map_err(|e| corrupt(e.to_string()))?;
-    let contribution = check_contribution(&wire, target).map_err(|wrong| {
+    let contribution = check_contribution(&wire, &reading.target).map_err(|wrong| {
         let first =
             wrong.first().map(|Violation { pointer, detail, .. }| format!("{pointer}: {detail}"));
         corrupt(first.unwrap_or_else(|| "is refused".to_owned()))
     })?;
-    let held = state == ContributionState::Held;
-    let contribution = Arc::new(as_received(contribution, received_at_us));
-    Ok(Logged { revision, held, contribution })
+    let is_own = wire.pose.provenance == v1::Provenance::OwnMap;
+    let held = is_own || state == ContributionState::Held;
+    let contribution = as_received(contribution, received_at_us);
+    let frame = reading.frames.get(&wire.frame).filter(|_| is_own);
+    let contribution = match frame {
+        Some(level_from_odom) => moved(&contribution, level_from_odom, reading.target.resolution_m),
+        None => contribution,
+    };
+    Ok(Logged { revision, held, contribution: Arc::new(contribution) })
 }

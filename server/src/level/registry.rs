@@ -8,6 +8,7 @@ use std::time::Duration;
 use tokio::sync::{Mutex as AsyncMutex, Notify, broadcast, mpsc, watch};
 use tokio::task::JoinHandle;
 
+use super::alignments::AlignmentCache;
 use super::append::Appender;
 use super::changes::ChangeCache;
 use super::fold::Folder;
@@ -308,6 +309,7 @@ impl Inner {
             trials,
             models: ModelCache::default(),
             changes: ChangeCache::default(),
+            alignments: AlignmentCache::default(),
             learned: LearnedCache::default(),
             store: self.store.clone(),
             alarm: self.alarm.clone(),

@@ -108,7 +108,8 @@ impl LevelHandle {
         let outcome = if moved.is_empty() {
             Outcome { revision, ..Outcome::default() }
         } else {
-            let moved = recall::batch(&self.shared.store, &self.shared.row, &moved).await?;
+            let moved =
+                recall::batch(&self.shared.store, &self.shared.row, &moved, revision).await?;
             let (answer, outcome) = oneshot::channel();
             let trial = Trial { kind, moved, answer };
             if self.shared.trials.send(trial).await.is_err() {

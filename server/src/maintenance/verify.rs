@@ -10,16 +10,15 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use mapfold_map::level::Level;
-use mapfold_schema::border::Target;
 use mapfold_schema::digest::content_digest;
 use sha2::{Digest, Sha256};
 
 use crate::level::folding::Folding;
 use crate::level::gdb;
 use crate::level::prior::Imported;
-use crate::level::recall::{self, Act, Entry, Logged};
+use crate::level::recall::{self, Act, Entry, Logged, Reading};
 use crate::level::rows;
-use crate::store::acts::ActRow;
+use crate::store::acts::{ActRow, Force};
 use crate::store::levels::LevelRow;
 use crate::store::log::LogRow;
 use crate::store::map_rows::{FeatureRow, MapRows, StoredMap};
@@ -87,7 +86,13 @@ pub async fn verify(store: &Store, site: &str, level: &str) -> Result<Option<Rep
     // What comes in meanwhile is not looked at.
     let until = row.revision.max(stored.folded_revision);
     let acts = store.acts_between(site, level, 0, until).await?;
-    let mut check = Check::new(&row, stored, &acts);
+    let stored_frames = store.frames_at(site, level, stored.folded_revision).await?;
+    let frames = store.frames_at(site, level, until).await?;
+    let readings = Readings {
+        of_stored: Reading::new(&row, stored_frames),
+        of_end: Reading::new(&row, frames),
+    };
+    let mut check = Check::new(&row, stored, &acts, readings);
     for fault in store.check_file().await? {
         check.fault(format!("database file: {fault}"));
     }
@@ -137,8 +142,16 @@ pub async fn verify(store: &Store, site: &str, level: &str) -> Result<Option<Rep
     Ok(Some(check.report(&row, &later)))
 }
 
+/// How rows are read as they are in force.
+struct Readings {
+    /// At the revision of the stored map.
+    of_stored: Reading,
+    /// At the end.
+    of_end: Reading,
+}
+
 struct Check {
-    target: Target,
+    readings: Readings,
     stored: StoredMap,
     stepwise: Folding,
     reversed: Level,
@@ -154,12 +167,12 @@ struct Check {
 }
 
 impl Check {
-    fn new(row: &LevelRow, stored: StoredMap, acts: &[ActRow]) -> Self {
+    fn new(row: &LevelRow, stored: StoredMap, acts: &[ActRow], readings: Readings) -> Self {
         let mut faults = Vec::new();
         let acts = Acts::new(acts, stored.folded_revision, |fault| faults.push(fault));
         faults.truncate(Report::FAULTS_MAX);
         let mut check = Self {
-            target: recall::target(row),
+            readings,
             stored,
             stepwise: Folding::empty(&recall::config(row)),
             reversed: Level::new(recall::config(row)),
@@ -188,7 +201,7 @@ impl Check {
         let mut logged: Vec<Logged> = Vec::with_capacity(page.len());
         for row in page {
             self.read += 1;
-            match self.recall(row) {
+            match self.recall(row, row.revision <= self.stored.folded_revision) {
                 Ok(contribution) => logged.push(contribution),
                 // Revisions of rows that cannot be read are passed over below, as if held.
                 Err(fault) => self.fault(format!("revision {}: {fault}", row.revision)),
@@ -205,8 +218,8 @@ impl Check {
             if piece.is_empty() {
                 continue;
             }
-            let out = if is_stored { &self.acts.out_of_stored } else { &self.acts.out };
-            let in_force = piece.iter().rev().filter(|l| !l.held && !out.contains(&l.revision));
+            let force = if is_stored { &self.acts.stored } else { &self.acts.end };
+            let in_force = piece.iter().rev().filter(|l| force.has(l.revision, l.held));
             self.reversed.fold(in_force.map(|logged| &*logged.contribution));
             for logged in piece {
                 self.step(&Entry::Contribution(logged));
@@ -266,18 +279,27 @@ impl Check {
     /// end.
     async fn catch_up(mut self, store: &Store, row: &LevelRow) -> Result<Self, StoreError> {
         let folded_revision = self.stored.folded_revision;
-        let Acts { out_of_stored, out, .. } = &self.acts;
-        let early = |revision: &&i64| **revision <= folded_revision;
-        let leaving: Vec<i64> = out.difference(out_of_stored).filter(early).copied().collect();
-        let coming: Vec<i64> = out_of_stored.difference(out).filter(early).copied().collect();
+        let Acts { stored, end, .. } = &self.acts;
+        // What was held may be in at another place: it leaves and comes anew.
+        let change = |before: &Force, after: &Force| -> Vec<i64> {
+            let was_held = |revision: &i64| {
+                stored.aligned.contains(revision) || end.aligned.contains(revision)
+            };
+            let moved = after.out.difference(&before.out).filter(|revision| !was_held(revision));
+            let aligned = before.aligned.difference(&before.out);
+            moved.chain(aligned).filter(|r| **r <= folded_revision).copied().collect()
+        };
+        let (leaving, coming) = (change(stored, end), change(end, stored));
         for (revisions, is_leaving) in [(leaving, true), (coming, false)] {
             for piece in revisions.chunks(PAGE as usize) {
                 let rows = store.log_rows(&row.site, &row.level, piece).await?;
                 self = self
                     .aside(move |check| {
                         // What cannot be read was a fault when it was read first.
-                        let logged: Vec<Logged> =
-                            rows.iter().filter_map(|row| check.recall(row).ok()).collect();
+                        let logged: Vec<Logged> = rows
+                            .iter()
+                            .filter_map(|row| check.recall(row, is_leaving).ok())
+                            .collect();
                         let contributions = logged.iter().map(|logged| &*logged.contribution);
                         if is_leaving {
                             check.reversed.unfold(contributions);
@@ -308,14 +330,16 @@ impl Check {
         })
     }
 
-    fn recall(&self, row: &LogRow) -> Result<Logged, String> {
+    /// A row as it is folded at the revision of the stored map, or at the end.
+    fn recall(&self, row: &LogRow, is_stored: bool) -> Result<Logged, String> {
         let uploaded = payload::join(&row.payload.features, &row.payload.evidence)
             .map_err(|e| e.to_string())?;
         let digest = content_digest(&uploaded).map_err(|e| e.to_string())?;
         if digest != row.digest {
             return Err(format!("its digest is {digest}, not {}", row.digest));
         }
-        recall::whole(row, &self.target).map_err(|e| e.to_string())
+        let Readings { of_stored, of_end } = &self.readings;
+        recall::whole(row, if is_stored { of_stored } else { of_end }).map_err(|e| e.to_string())
     }
 
     fn compare_here(&mut self) {
@@ -387,7 +411,7 @@ impl Check {
         for revision in std::mem::take(&mut self.astray) {
             // An act that came while the log was read may have changed the row's word.
             if !later.iter().any(|act| act.moved.binary_search(&revision).is_ok()) {
-                let is = if self.acts.out.contains(&revision) { "is" } else { "is not" };
+                let is = if self.acts.end.out.contains(&revision) { "is" } else { "is not" };
                 self.fault(format!("revision {revision} {is} reverted, but says otherwise"));
             }
         }
@@ -415,7 +439,7 @@ impl Check {
             revision,
             folded_revision: self.stored.folded_revision,
             contributions: self.read,
-            reverted: self.acts.out.len(),
+            reverted: self.acts.end.out.len(),
             acts: self.acts.count,
             imports: self.imports,
             gdb_entries: self.gdb_entries,

@@ -31,9 +31,13 @@ pub enum ActKind {
     Revert,
     /// Puts back what a revert took out.
     Restore,
+    /// Puts in what was held of a robot's own frame.
+    Align,
+    /// Takes out what alignments have put in.
+    Withdraw,
 }
 
-/// An act as the fold reads it. Both lists ascend.
+/// An act or an alignment, as the fold reads it. Both lists ascend.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ActRow {
     /// Its place in the log.
@@ -41,7 +45,7 @@ pub struct ActRow {
     /// What it does.
     pub kind: ActKind,
     /// Contributions that a revert keeps out for as long as it stands; of a restore, those of the
-    /// revert that it undoes.
+    /// revert that it undoes. Of an alignment or its withdrawal, what it moved.
     pub covered: Vec<i64>,
     /// Those of them that it moved out of the map, or back into it.
     pub moved: Vec<i64>,
@@ -283,6 +287,9 @@ impl Entry<'_> {
         let (before, after, sign) = match kind {
             ActKind::Revert => ("folded", "reverted", 1),
             ActKind::Restore => ("reverted", "folded", -1),
+            ActKind::Align | ActKind::Withdraw => {
+                return Err(corrupt(TABLE, act.id.to_string(), "alignments are no acts"));
+            }
         };
         let mut moved = 0;
         for (statement, piece) in SET_STATE.statements(&revisions(&found.moved)) {
@@ -320,23 +327,64 @@ fn revisions(moved: &BTreeMap<i64, String>) -> Vec<i64> {
 }
 
 /// Which contributions are out after `acts`, in the order of the log, by revision.
-pub fn out_after<'a>(acts: impl IntoIterator<Item = &'a ActRow>) -> BTreeSet<i64> {
+fn out_after<'a>(acts: impl IntoIterator<Item = &'a ActRow>) -> BTreeSet<i64> {
     let mut out = BTreeSet::new();
     for act in acts {
         for revision in &act.moved {
             match act.kind {
                 ActKind::Revert => out.insert(*revision),
                 ActKind::Restore => out.remove(revision),
+                ActKind::Align | ActKind::Withdraw => false,
             };
         }
     }
     out
 }
 
+/// Which contributions are in force after some acts.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Force {
+    /// Taken out.
+    pub out: BTreeSet<i64>,
+    /// Held when they came, and put in.
+    pub aligned: BTreeSet<i64>,
+}
+
+impl Force {
+    /// After `acts`, in the order of the log.
+    pub fn after<'a>(acts: impl IntoIterator<Item = &'a ActRow> + Clone) -> Self {
+        Self { out: out_after(acts.clone()), aligned: aligned_after(acts) }
+    }
+
+    /// Whether a contribution is, that was `held` when it came.
+    pub fn has(&self, revision: i64, held: bool) -> bool {
+        (!held || self.aligned.contains(&revision)) && !self.out.contains(&revision)
+    }
+}
+
+/// Which contributions that were held are in after `acts`, in the order of the log, by revision.
+fn aligned_after<'a>(acts: impl IntoIterator<Item = &'a ActRow>) -> BTreeSet<i64> {
+    let mut aligned = BTreeSet::new();
+    for act in acts {
+        match act.kind {
+            ActKind::Align => aligned.extend(&act.moved),
+            ActKind::Withdraw => {
+                for revision in &act.moved {
+                    aligned.remove(revision);
+                }
+            }
+            ActKind::Revert | ActKind::Restore => {}
+        }
+    }
+    aligned
+}
+
 fn kind_text(kind: ActKind) -> &'static str {
     match kind {
         ActKind::Revert => "revert",
         ActKind::Restore => "restore",
+        ActKind::Align => "align",
+        ActKind::Withdraw => "withdraw",
     }
 }
 

@@ -14,6 +14,7 @@ use uuid::Uuid;
 use super::log::{parse_state, state_text};
 use super::payload::Payload;
 use super::row::{corrupt, get};
+use super::transaction::Tx;
 use super::values::{Bulk, bulk, with_values};
 use super::{Store, StoreError, retried, robots};
 
@@ -43,7 +44,9 @@ pub struct NewContribution {
     pub cluster_count: u32,
     /// Number of tiles in it, of all layers.
     pub tile_count: u32,
-    /// `level_from_robot`: x, y (metres), heading (radians).
+    /// The robot's own frame that it is in; none if that is the level's. It is held then.
+    pub frame: Option<Uuid>,
+    /// `level_from_robot`, or the robot's pose in its own frame: x, y (metres), heading (radians).
     pub pose: [f64; 3],
     /// Covariance of the pose.
     pub pose_covariance: [[f64; 3]; 3],
@@ -87,8 +90,8 @@ enum Attempt {
 static INSERT: Bulk = bulk!(
     "insert into contributions (site, level, revision, contribution, digest, robot, state, \
      observed_at_us, received_at_us, emulated, segment_count, cluster_count, tile_count, x_m, y_m, \
-     heading_rad, features, evidence) values ",
-    18,
+     heading_rad, frame, features, evidence) values ",
+    19,
     from 1,
     " on conflict (site, level, contribution) do nothing"
 );
@@ -202,9 +205,10 @@ impl Store {
         };
         let head: i64 = get(&head, "levels", "revision")?;
 
-        let shares = robot_shares(rows);
         let mut states: BTreeMap<String, RobotState> = BTreeMap::new();
-        for (statement, piece) in UPDATE_ROBOTS.statements(&shares) {
+        let Shares { placed, lost } = robot_shares(rows);
+        count_lost(&mut tx, site, &lost, &mut states).await?;
+        for (statement, piece) in UPDATE_ROBOTS.statements(&placed) {
             let mut query = sqlx::query(statement).bind(site).bind(level);
             for (newest, count) in piece {
                 let covariance = serde_json::to_string(&newest.pose_covariance)
@@ -223,9 +227,9 @@ impl Store {
                 states.insert(get(&row, "robots", "robot")?, robots::state(&row)?);
             }
         }
-        if states.len() < shares.len() {
+        if states.len() < placed.len() + lost.len() {
             tx.rollback().await?;
-            let robots = shares.iter().map(|(newest, _)| newest.robot.clone());
+            let robots = rows.iter().map(|row| row.robot.clone());
             return Ok(Attempt::UnknownRobots(
                 robots.filter(|robot| !states.contains_key(robot)).collect(),
             ));
@@ -237,8 +241,8 @@ impl Store {
                 revision,
                 received_at_us: row.received_at_us,
                 state: match states.get(&row.robot) {
-                    Some(RobotState::Active) => ContributionState::Folded,
-                    Some(RobotState::Held) | None => ContributionState::Held,
+                    Some(RobotState::Active) if row.frame.is_none() => ContributionState::Folded,
+                    Some(RobotState::Active | RobotState::Held) | None => ContributionState::Held,
                 },
             })
             .collect();
@@ -266,6 +270,7 @@ impl Store {
                     .bind(x)
                     .bind(y)
                     .bind(heading)
+                    .bind(row.frame.map(|frame| frame.to_string()))
                     .bind(row.payload.features.as_slice())
                     .bind(row.payload.evidence.as_slice());
             }
@@ -303,18 +308,56 @@ impl Store {
     }
 }
 
-/// For each robot of a batch the newest of its contributions and how many there are. By name, so
-/// that transactions of several levels lock robots in one order.
-fn robot_shares<'r>(rows: &[&'r NewContribution]) -> Vec<(&'r NewContribution, i64)> {
-    let mut shares: BTreeMap<&str, (&NewContribution, i64)> = BTreeMap::new();
+/// Whose a batch is. By name, so that transactions of several levels lock robots in one order.
+struct Shares<'r> {
+    /// For each robot the newest of its contributions on the level, and how many there are in all.
+    placed: Vec<(&'r NewContribution, i64)>,
+    /// Robots of which all are in frames of their own, and how many.
+    lost: Vec<(&'r str, i64)>,
+}
+
+fn robot_shares<'r>(rows: &[&'r NewContribution]) -> Shares<'r> {
+    let mut all: BTreeMap<&str, (Option<&NewContribution>, i64)> = BTreeMap::new();
     for row in rows {
-        let (newest, count) = shares.entry(row.robot.as_str()).or_insert((row, 0));
+        let (newest, count) = all.entry(row.robot.as_str()).or_default();
         *count += 1;
-        if row.observed_at_us > newest.observed_at_us {
-            *newest = row;
+        let is_newer = newest.is_none_or(|newest| row.observed_at_us > newest.observed_at_us);
+        if row.frame.is_none() && is_newer {
+            *newest = Some(row);
         }
     }
-    shares.into_values().collect()
+    let mut shares = Shares { placed: Vec::new(), lost: Vec::new() };
+    for (robot, (newest, count)) in all {
+        match newest {
+            Some(newest) => shares.placed.push((newest, count)),
+            None => shares.lost.push((robot, count)),
+        }
+    }
+    shares
+}
+
+/// Counts contributions of robots that do not know where they are: nothing is noted of their poses.
+async fn count_lost(
+    tx: &mut Tx,
+    site: &str,
+    lost: &[(&str, i64)],
+    states: &mut BTreeMap<String, RobotState>,
+) -> Result<(), StoreError> {
+    for (robot, count) in lost {
+        let row = sqlx::query(
+            "update robots set contributions = contributions + $3 \
+             where site = $1 and robot = $2 returning robot, state",
+        )
+        .bind(site)
+        .bind(*robot)
+        .bind(*count)
+        .fetch_optional(&mut **tx)
+        .await?;
+        if let Some(row) = row {
+            states.insert(get(&row, "robots", "robot")?, robots::state(&row)?);
+        }
+    }
+    Ok(())
 }
 
 /// What stands in the log under an id.

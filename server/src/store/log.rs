@@ -91,7 +91,7 @@ static ROWS: Bulk = bulk_in!(
 macro_rules! entry_columns {
     () => {
         "contribution, revision, robot, observed_at_us, received_at_us, emulated, segment_count, \
-         cluster_count, tile_count, x_m, y_m, heading_rad, state"
+         cluster_count, tile_count, x_m, y_m, heading_rad, frame, state"
     };
 }
 
@@ -354,6 +354,7 @@ fn log_row(row: &AnyRow) -> Result<LogRow, StoreError> {
 fn entry(row: &AnyRow) -> Result<v1::ContributionEntry, StoreError> {
     let id: String = get(row, TABLE, "contribution")?;
     let emulated: i64 = get(row, TABLE, "emulated")?;
+    let frame: Option<String> = get(row, TABLE, "frame")?;
     Ok(v1::ContributionEntry {
         id: id.parse().map_err(|e| corrupt(TABLE, id, e))?,
         revision: get(row, TABLE, "revision")?,
@@ -365,6 +366,9 @@ fn entry(row: &AnyRow) -> Result<v1::ContributionEntry, StoreError> {
         clusters: count(row, TABLE, "cluster_count")?,
         tiles: count(row, TABLE, "tile_count")?,
         pose: [get(row, TABLE, "x_m")?, get(row, TABLE, "y_m")?, get(row, TABLE, "heading_rad")?],
+        frame: frame
+            .map(|frame| frame.parse().map_err(|e| corrupt(TABLE, &*frame, e)))
+            .transpose()?,
         state: state(row)?,
     })
 }

@@ -25,6 +25,7 @@ fn table(floor: &Level, look: &Value) -> Vec<Row> {
     let site = |template: &str| route::of_site(template, &floor.site);
     let contribution = format!("{}/{}", level(route::CONTRIBUTIONS), look["id"].as_str().unwrap());
     let revert = level(route::REVERT).replace("{id}", look["id"].as_str().unwrap());
+    let alignment = level(route::ALIGNMENT).replace("{frame}", look["id"].as_str().unwrap());
     let change = level(route::CHANGE).replace("{id}", "new");
     let tile = level(route::TILES).replace("{z}/{row}/{col}", "6/0/0.png");
     let cells = level(route::RASTER_TILE).replace("{x}/{y}", "0/0");
@@ -69,6 +70,9 @@ fn table(floor: &Level, look: &Value) -> Vec<Row> {
         ),
         ("GET", revert.clone(), none.clone(), [401, 404, 404, 404, 404]),
         ("DELETE", revert, none.clone(), [401, 403, 404, 403, 404]),
+        ("GET", level(route::ALIGNMENTS), none.clone(), read),
+        ("POST", alignment.clone(), json!({}), [401, 403, 404, 403, 409]),
+        ("DELETE", alignment, none.clone(), [401, 403, 404, 403, 409]),
         ("GET", level(route::VECTOR), none.clone(), read),
         ("GET", level(route::RASTER), none.clone(), read),
         ("GET", cells, none.clone(), read),
@@ -160,6 +164,7 @@ fn template_of(path: &str) -> String {
     match parts.get(5..) {
         Some(["robots", robot, ..]) if robot.starts_with('{') => parts[6] = "{robot}",
         Some([_, _, "contributions" | "reverts" | "changes", _]) => parts[8] = "{id}",
+        Some([_, _, "alignments", _]) => parts[8] = "{frame}",
         Some([_, _, "tiles", ..]) => {
             parts.splice(8.., ["{z}", "{row}", "{col}.png"]).for_each(drop);
         }

@@ -5,11 +5,12 @@ use mapfold_schema::v1::{ContributionPage, RobotDescription};
 use mapfold_server::config::Secret;
 use sqlx::{AnyConnection, AssertSqlSafe, Connection, Executor};
 
+use crate::alignments;
 use crate::server::Server;
 use crate::world::Level;
 
 /// Tells a small story and answers what can be seen of it.
-async fn story(server: &Server) -> (Vec<u8>, Vec<u8>, Vec<i64>) {
+async fn story(server: &Server) -> (Vec<u8>, Vec<u8>, Vec<i64>, [Vec<u8>; 2]) {
     let floor = Level::create(&server.admin()).await;
     floor.enrol("r2").await;
     let robot = server.with(&floor.token("r1").await);
@@ -28,6 +29,7 @@ async fn story(server: &Server) -> (Vec<u8>, Vec<u8>, Vec<i64>) {
     assert_eq!(seen.contributions, 3);
     assert!(seen.last_pose.is_some());
     server.anybody().get("/readyz").await.expect(200);
+    let aligned = alignments::story(server, &floor).await;
     let log: ContributionPage =
         robot.get(&floor.path(route::CONTRIBUTIONS)).await.expect(200).data();
     let export = |format| floor.path(route::EXPORTS).replace("{format}", format);
@@ -35,6 +37,7 @@ async fn story(server: &Server) -> (Vec<u8>, Vec<u8>, Vec<i64>) {
         robot.get(&export("geojson")).await.expect(200).body,
         robot.get(&export("nav2")).await.expect(200).body,
         log.contributions.iter().map(|entry| entry.revision).collect(),
+        aligned,
     )
 }
 
@@ -63,5 +66,5 @@ async fn postgres_and_sqlite_tell_the_same_story() {
     let server = Server::start().await;
     let on_sqlite = story(&server).await;
     assert!(on_postgres == on_sqlite, "the engines differ");
-    assert_eq!(on_sqlite.2, [4, 3, 2, 1]);
+    assert_eq!(on_sqlite.2, [8, 6, 5, 4, 3, 2, 1]);
 }

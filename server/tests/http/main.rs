@@ -15,6 +15,7 @@ mod server;
 mod world;
 
 mod access;
+mod alignments;
 mod changes;
 mod conditional;
 mod description;

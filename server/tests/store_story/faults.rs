@@ -90,7 +90,7 @@ async fn a_spoilt_row_closes_its_level_and_no_other(database: Database) {
         .meddle(
             "insert into contributions select site, level, 11, 'of nobody', digest, robot, state, \
              observed_at_us, received_at_us, emulated, segment_count, cluster_count, tile_count, \
-             x_m, y_m, heading_rad, evidence, features from contributions where revision = 10",
+             x_m, y_m, heading_rad, evidence, features, frame from contributions where revision = 10",
         )
         .await;
     assert_eq!(spoilt, 1);

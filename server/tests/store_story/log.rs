@@ -32,6 +32,7 @@ pub(crate) fn row(look: &v1::Contribution) -> NewContribution {
         segment_count: look.segments.len() as u32,
         cluster_count: look.clusters.len() as u32,
         tile_count: look.evidence.iter().map(|e| e.tiles.len() as u32).sum(),
+        frame: None,
         pose: [look.pose.x_m, look.pose.y_m, look.pose.heading_rad],
         pose_covariance: look.pose.covariance,
         payload: payload::split(look.clone()).unwrap(),

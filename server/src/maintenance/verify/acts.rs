@@ -5,15 +5,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use mapfold_schema::v1::ContributionState;
 
-use crate::store::acts::{ActKind, ActRow, out_after};
+use crate::store::acts::{ActKind, ActRow, Force};
 
 /// The acts of a log up to where it is checked.
 #[derive(Debug, Default)]
 pub(super) struct Acts {
-    /// Out at the revision of the stored map.
-    pub(super) out_of_stored: BTreeSet<i64>,
-    /// Out at the end.
-    pub(super) out: BTreeSet<i64>,
+    /// In force at the revision of the stored map.
+    pub(super) stored: Force,
+    /// In force at the end.
+    pub(super) end: Force,
     /// How many there are.
     pub(super) count: usize,
 }
@@ -27,11 +27,22 @@ impl Acts {
     ) -> Self {
         // By how many reverts that stand each contribution is covered.
         let mut covers: BTreeMap<i64, u32> = BTreeMap::new();
+        let mut aligned: BTreeSet<i64> = BTreeSet::new();
         for act in acts {
             let mut moved = Vec::new();
             for revision in &act.covered {
                 let cover = covers.entry(*revision).or_default();
                 match act.kind {
+                    ActKind::Align => {
+                        if aligned.insert(*revision) {
+                            moved.push(*revision);
+                        }
+                    }
+                    ActKind::Withdraw => {
+                        if aligned.remove(revision) && *cover == 0 {
+                            moved.push(*revision);
+                        }
+                    }
                     ActKind::Revert => {
                         *cover += 1;
                         if *cover == 1 {
@@ -56,14 +67,17 @@ impl Acts {
             }
         }
         let stored = acts.iter().filter(|act| act.revision <= folded_revision);
-        Self { out_of_stored: out_after(stored), out: out_after(acts), count: acts.len() }
+        Self { stored: Force::after(stored), end: Force::after(acts), count: acts.len() }
     }
 
     /// Whether a row may say of itself that it is in `state`.
     pub(super) fn allow(&self, revision: i64, state: ContributionState) -> bool {
         match state {
-            ContributionState::Reverted => self.out.contains(&revision),
-            ContributionState::Folded | ContributionState::Held => !self.out.contains(&revision),
+            ContributionState::Reverted => self.end.out.contains(&revision),
+            ContributionState::Folded => !self.end.out.contains(&revision),
+            ContributionState::Held => {
+                !self.end.out.contains(&revision) && !self.end.aligned.contains(&revision)
+            }
         }
     }
 }

@@ -6,6 +6,7 @@ use sqlx::any::AnyRow;
 use uuid::Uuid;
 
 use super::{ActRow, TABLE, parse_kind};
+use crate::store::alignments;
 use crate::store::revision_list;
 use crate::store::row::{corrupt, count, get};
 use crate::store::transaction::Tx;
@@ -95,7 +96,7 @@ impl Store {
         Ok(Some(v1::RevertRecord { revert, contributions }))
     }
 
-    /// All acts after revision `after` and up to revision `until`, in the order of the log.
+    /// All acts and alignments after revision `after` and up to revision `until`, in the order of the log.
     ///
     /// # Errors
     /// The store fails, or a row is spoilt.
@@ -116,18 +117,21 @@ impl Store {
         .bind(until)
         .fetch_all(self.reads())
         .await?;
-        rows.iter().map(act).collect()
+        let mut acts = rows.iter().map(act).collect::<Result<Vec<_>, _>>()?;
+        acts.extend(alignments::acts_between(self, site, level, after, until).await?);
+        acts.sort_by_key(|act| act.revision);
+        Ok(acts)
     }
 }
 
-/// The first act after revision `after`.
+/// The first act or alignment after revision `after`.
 pub(in crate::store) async fn first_after(
     tx: &mut Tx,
     site: &str,
     level: &str,
     after: i64,
 ) -> Result<Option<ActRow>, StoreError> {
-    sqlx::query(
+    let act = sqlx::query(
         "select revision, kind, covered, moved from acts where site = $1 and level = $2 \
          and revision > $3 order by revision limit 1",
     )
@@ -137,7 +141,9 @@ pub(in crate::store) async fn first_after(
     .fetch_optional(&mut **tx)
     .await?
     .map(|row| act(&row))
-    .transpose()
+    .transpose()?;
+    let alignment = alignments::first_after(tx, site, level, after).await?;
+    Ok(act.into_iter().chain(alignment).min_by_key(|act| act.revision))
 }
 
 /// One revert.
