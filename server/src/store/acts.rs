@@ -16,6 +16,7 @@ pub(super) use read::first_after as first_act_after;
 use targets::{Found, resolve, still_covered};
 pub use targets::{Plan, REVERT_MAX, Span, Targets};
 
+use super::log::state_text;
 use super::revision_list;
 use super::row::{corrupt, get};
 use super::transaction::Tx;
@@ -256,6 +257,7 @@ struct Entry<'a> {
 
 impl Entry<'_> {
     async fn write(&self, tx: &mut Tx, site: &str, level: &str) -> Result<(), StoreError> {
+        use v1::ContributionState::{Folded, Reverted};
         let Self { revision, kind, act, span, found } = self;
         let robots =
             serde_json::to_string(&found.shares).map_err(|e| corrupt(TABLE, "robots", e))?;
@@ -285,24 +287,16 @@ impl Entry<'_> {
         .await?;
 
         let (before, after, sign) = match kind {
-            ActKind::Revert => ("folded", "reverted", 1),
-            ActKind::Restore => ("reverted", "folded", -1),
+            ActKind::Revert => (Folded, Reverted, 1),
+            ActKind::Restore => (Reverted, Folded, -1),
             ActKind::Align | ActKind::Withdraw => {
                 return Err(corrupt(TABLE, act.id.to_string(), "alignments are no acts"));
             }
         };
-        let mut moved = 0;
-        for (statement, piece) in SET_STATE.statements(&revisions(&found.moved)) {
-            let mut query = sqlx::query(statement).bind(site).bind(level).bind(after).bind(before);
-            for revision in piece {
-                query = query.bind(*revision);
-            }
-            moved += query.execute(&mut **tx).await?.rows_affected();
-        }
-        if moved != found.moved.len() as u64 {
-            let detail = format!("{moved} of {} contributions were {before}", found.moved.len());
-            return Err(corrupt(TABLE, act.id.to_string(), detail));
-        }
+        let key = act.id.to_string();
+        move_contributions(tx, (site, level), &revisions(&found.moved), before, after)
+            .await?
+            .map_err(|detail| corrupt(TABLE, key, detail))?;
         // By name, as appends do it: transactions of several levels lock robots in one order.
         let mut counts: BTreeMap<&str, i64> = BTreeMap::new();
         for robot in found.moved.values() {
@@ -320,6 +314,30 @@ impl Entry<'_> {
         }
         Ok(())
     }
+}
+
+/// Moves contributions that must all be in one state into another. The inner error tells that some were not, and the
+/// transaction is not to be kept.
+pub(super) async fn move_contributions(
+    tx: &mut Tx,
+    (site, level): (&str, &str),
+    revisions: &[i64],
+    from: v1::ContributionState,
+    to: v1::ContributionState,
+) -> Result<Result<(), String>, StoreError> {
+    let (from, to) = (state_text(from), state_text(to));
+    let mut moved = 0;
+    for (statement, piece) in SET_STATE.statements(revisions) {
+        let mut query = sqlx::query(statement).bind(site).bind(level).bind(to).bind(from);
+        for revision in piece {
+            query = query.bind(*revision);
+        }
+        moved += query.execute(&mut **tx).await?.rows_affected();
+    }
+    if moved == revisions.len() as u64 {
+        return Ok(Ok(()));
+    }
+    Ok(Err(format!("{moved} of {} contributions were {from}", revisions.len())))
 }
 
 fn revisions(moved: &BTreeMap<i64, String>) -> Vec<i64> {

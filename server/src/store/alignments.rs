@@ -14,12 +14,11 @@ use uuid::Uuid;
 
 pub(super) use read::{acts_between, first_after};
 
-use super::acts::next_revision;
+use super::acts::{move_contributions, next_revision};
 use super::log::state_text;
 use super::revision_list;
 use super::row::{corrupt, get};
 use super::transaction::Tx;
-use super::values::{Bulk, bulk_in};
 use super::{Store, StoreError, retried};
 
 const TABLE: &str = "alignments";
@@ -74,13 +73,6 @@ pub enum AlignmentRefusal {
     TooMany(usize),
 }
 
-static SET_STATE: Bulk = bulk_in!(
-    "update contributions set state = $3 where site = $1 and level = $2 and state = $4 \
-     and revision in ",
-    from 5,
-    ""
-);
-
 impl Store {
     /// Puts all that is held of a frame into the map at `pose`, as one entry of the log; without a pose, at
     /// that of the alignment which stands for it.
@@ -92,7 +84,7 @@ impl Store {
         site: &str,
         level: &str,
         frame: Uuid,
-        pose: Option<&v1::FramePose>,
+        pose: Option<&v1::UncertainPose>,
         entry: &NewEntry,
     ) -> Result<Result<v1::Alignment, AlignmentRefusal>, StoreError> {
         retried("align", || self.try_align(site, level, frame, pose, entry)).await
@@ -103,7 +95,7 @@ impl Store {
         site: &str,
         level: &str,
         frame: Uuid,
-        pose: Option<&v1::FramePose>,
+        pose: Option<&v1::UncertainPose>,
         entry: &NewEntry,
     ) -> Result<Result<v1::Alignment, AlignmentRefusal>, StoreError> {
         let mut tx = self.begin_write().await?;
@@ -225,25 +217,13 @@ async fn in_state(
 
 async fn set_state(
     tx: &mut Tx,
-    (site, level): (&str, &str),
+    level: (&str, &str),
     revisions: &[i64],
     from: v1::ContributionState,
     to: v1::ContributionState,
 ) -> Result<(), StoreError> {
-    let mut moved = 0;
-    for (statement, piece) in SET_STATE.statements(revisions) {
-        let query = sqlx::query(statement).bind(site).bind(level);
-        let mut query = query.bind(state_text(to)).bind(state_text(from));
-        for revision in piece {
-            query = query.bind(*revision);
-        }
-        moved += query.execute(&mut **tx).await?.rows_affected();
-    }
-    if moved == revisions.len() as u64 {
-        return Ok(());
-    }
-    let detail = format!("{moved} of {} contributions were {}", revisions.len(), state_text(from));
-    Err(corrupt(TABLE, "moved", detail))
+    let moved = move_contributions(tx, level, revisions, from, to).await?;
+    moved.map_err(|detail| corrupt(TABLE, "moved", detail))
 }
 
 /// An entry on its way into the log.
@@ -251,7 +231,7 @@ struct Line<'a> {
     revision: i64,
     kind: &'static str,
     frame: Uuid,
-    pose: &'a v1::FramePose,
+    pose: &'a v1::UncertainPose,
     entry: &'a NewEntry,
     moved: &'a [i64],
 }

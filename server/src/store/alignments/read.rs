@@ -15,6 +15,14 @@ use crate::store::row::{corrupt, count, get};
 use crate::store::transaction::Tx;
 use crate::store::{Store, StoreError, robots};
 
+/// The columns that make an alignment.
+macro_rules! columns {
+    () => {
+        "revision, frame, x_m, y_m, heading_rad, covariance, author, at_us, comment, moved_count, \
+         withdrawn_revision"
+    };
+}
+
 impl Store {
     /// Frames of which contributions are held on a level, by frame.
     ///
@@ -60,11 +68,12 @@ impl Store {
         level: &str,
         limit: u32,
     ) -> Result<Vec<v1::Alignment>, StoreError> {
-        let rows = sqlx::query(
-            "select revision, frame, x_m, y_m, heading_rad, covariance, author, at_us, comment, \
-             moved_count, withdrawn_revision from alignments where site = $1 and level = $2 \
-             and kind = 'align' order by revision desc limit $3",
-        )
+        let rows = sqlx::query(concat!(
+            "select ",
+            columns!(),
+            " from alignments where site = $1 and level = $2 \
+             and kind = 'align' order by revision desc limit $3"
+        ))
         .bind(site)
         .bind(level)
         .bind(i64::from(limit))
@@ -83,12 +92,13 @@ impl Store {
         level: &str,
         revision: i64,
     ) -> Result<Frames, StoreError> {
-        let rows = sqlx::query(
-            "select revision, frame, x_m, y_m, heading_rad, covariance, author, at_us, comment, \
-             moved_count, withdrawn_revision from alignments where site = $1 and level = $2 \
+        let rows = sqlx::query(concat!(
+            "select ",
+            columns!(),
+            " from alignments where site = $1 and level = $2 \
              and kind = 'align' and revision <= $3 \
-             and (withdrawn_revision is null or withdrawn_revision >= $3)",
-        )
+             and (withdrawn_revision is null or withdrawn_revision >= $3)"
+        ))
         .bind(site)
         .bind(level)
         .bind(revision)
@@ -97,7 +107,7 @@ impl Store {
         let mut frames = Frames::new();
         for row in &rows {
             let alignment = describe(row)?;
-            let v1::FramePose { x_m, y_m, heading_rad, covariance } = alignment.pose;
+            let v1::UncertainPose { x_m, y_m, heading_rad, covariance } = alignment.pose;
             let covariance = Covariance::from_rows(covariance)
                 .map_err(|e| corrupt(TABLE, format!("revision {}", alignment.revision), e))?;
             let pose = Pose::new(x_m, y_m, heading_rad);
@@ -114,12 +124,13 @@ pub(super) async fn standing(
     level: &str,
     frame: Uuid,
 ) -> Result<Option<v1::Alignment>, StoreError> {
-    sqlx::query(
-        "select revision, frame, x_m, y_m, heading_rad, covariance, author, at_us, comment, \
-         moved_count, withdrawn_revision from alignments where site = $1 and level = $2 \
-         and frame = $3 and kind = 'align' and withdrawn_revision is null \
-         order by revision limit 1",
-    )
+    sqlx::query(concat!(
+        "select ",
+        columns!(),
+        " from alignments where site = $1 and level = $2 \
+             and frame = $3 and kind = 'align' and withdrawn_revision is null \
+         order by revision limit 1"
+    ))
     .bind(site)
     .bind(level)
     .bind(frame.to_string())
@@ -198,7 +209,7 @@ fn describe(row: &AnyRow) -> Result<v1::Alignment, StoreError> {
     Ok(v1::Alignment {
         revision: get(row, TABLE, "revision")?,
         frame: uuid(row, TABLE)?,
-        pose: v1::FramePose {
+        pose: v1::UncertainPose {
             x_m: get(row, TABLE, "x_m")?,
             y_m: get(row, TABLE, "y_m")?,
             heading_rad: get(row, TABLE, "heading_rad")?,
