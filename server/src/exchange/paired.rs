@@ -3,6 +3,8 @@
 
 use mapfold_map::geometry::Point;
 
+use super::incoming::Found;
+
 /// How lines become walls.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct WallConfig {
@@ -70,6 +72,20 @@ pub(super) struct Walls {
     pub(super) short: usize,
     /// Whether there were too many to look at all pairs.
     pub(super) is_crowded: bool,
+}
+
+impl Walls {
+    /// Tells which lines did not become walls.
+    pub(super) fn tell(&self, found: &mut Found) {
+        if self.is_crowded {
+            let words =
+                "so many lines of walls lie close to each other that not all were taken in pairs";
+            found.warnings.push(words.to_owned());
+        }
+        for _ in 0..self.short {
+            found.leave_out("lines of walls", "they are too short");
+        }
+    }
 }
 
 /// A line with what of it is not used yet, as stretches along it.

@@ -61,14 +61,7 @@ impl Objects<'_> {
             }
         }
         let drawn = walls(&lines, &WallConfig::STANDARD);
-        if drawn.is_crowded {
-            let words =
-                "so many lines of walls lie close to each other that not all were taken in pairs";
-            self.found.warnings.push(words.to_owned());
-        }
-        for _ in 0..drawn.short {
-            self.found.leave_out("lines of walls", "they are too short");
-        }
+        drawn.tell(self.found);
         for (index, wall) in drawn.found.iter().enumerate() {
             let heights = self.heights(wall.heights, ObjectKind::Wall);
             let solid = upright_box(ObjectKind::Wall, wall.ends, wall.thickness, heights);

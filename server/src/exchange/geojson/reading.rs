@@ -294,14 +294,7 @@ impl Plan<'_> {
     /// Lines of walls: two alongside each other are the faces of one.
     fn lines(&mut self, lines: &[WallLine]) -> Result<(), FileFault> {
         let drawn = walls(lines, &WallConfig::STANDARD);
-        if drawn.is_crowded {
-            let words =
-                "so many lines of walls lie close to each other that not all were taken in pairs";
-            self.found.warnings.push(words.to_owned());
-        }
-        for _ in 0..drawn.short {
-            self.found.leave_out("lines of walls", "they are too short");
-        }
+        drawn.tell(self.found);
         let heights = heights(ObjectKind::Wall, self.wall_height_m);
         for (index, wall) in drawn.found.iter().enumerate() {
             let made = upright_box(ObjectKind::Wall, wall.ends, wall.thickness, heights);
