@@ -14,6 +14,7 @@ mod model_change;
 mod model_file;
 mod patch;
 mod plan;
+mod pose;
 mod receipt;
 mod revert;
 mod robot;
@@ -23,8 +24,7 @@ mod site;
 mod token;
 
 pub use alignment::{
-    Alignment, AlignmentCandidate, AlignmentDoubt, Alignments, FramePose, NewAlignment,
-    UnalignedFrame,
+    Alignment, AlignmentCandidate, AlignmentDoubt, Alignments, NewAlignment, UnalignedFrame,
 };
 pub use building::{BuildingImport, BuildingReport};
 pub use contribution::{
@@ -62,14 +62,13 @@ pub use plan::{
     GdbPlan, Landmark, LandmarkKind, LandmarkSource, LandmarkSupport, LandmarkTable, PlanCorner,
     PlanObject, PlanOpening, PlanOpeningSide,
 };
+pub use pose::UncertainPose;
 pub use receipt::{Receipt, UploadAnswer};
 pub use revert::{
     ChangeCounts, ChangeKind, ChangedFeature, FeatureKind, NewRevert, Revert, RevertPage,
     RevertPreview, RevertRecord, RobotShare, Undone,
 };
-pub use robot::{
-    FixKind, FixPlace, LastPose, NewRobot, RobotDescription, RobotFix, RobotState, RobotUpdate,
-};
+pub use robot::{FixKind, LastPose, NewRobot, RobotDescription, RobotFix, RobotState, RobotUpdate};
 pub use sensor::{RangeCorrection, SensorKind, SensorMount, SensorProfile};
 pub use session::{NewSession, SessionDescription};
 pub use site::{NewSite, SiteDescription};

@@ -815,8 +815,8 @@ export interface components {
              * @description The frame.
              */
             frame: string;
-            /** @description Where it lies. */
-            pose: components["schemas"]["FramePose"];
+            /** @description `level_from_odom`: where it lies. */
+            pose: components["schemas"]["UncertainPose"];
             /**
              * Format: int64
              * @description Its place in the level's log.
@@ -851,7 +851,7 @@ export interface components {
              */
             overlap: number;
             /** @description The pose. */
-            pose: components["schemas"]["FramePose"];
+            pose: components["schemas"]["UncertainPose"];
             /**
              * Format: double
              * @description Root mean square distance of walls that agree.
@@ -1257,46 +1257,6 @@ export interface components {
          * @enum {string}
          */
         FixKind: "unique" | "tracked" | "ambiguous" | "no_match";
-        /** @description Where a robot may be. */
-        FixPlace: {
-            /** @description Covariance of (x, y, heading). */
-            covariance: number[][];
-            /**
-             * Format: double
-             * @description Heading.
-             */
-            heading_rad: number;
-            /**
-             * Format: double
-             * @description Position, x.
-             */
-            x_m: number;
-            /**
-             * Format: double
-             * @description Position, y.
-             */
-            y_m: number;
-        };
-        /** @description `level_from_odom`: where the origin of a robot's own frame lies on the level. */
-        FramePose: {
-            /** @description Covariance of (x, y, heading), row by row. */
-            covariance: number[][];
-            /**
-             * Format: double
-             * @description Heading, counter-clockwise from x.
-             */
-            heading_rad: number;
-            /**
-             * Format: double
-             * @description Position, x.
-             */
-            x_m: number;
-            /**
-             * Format: double
-             * @description Position, y.
-             */
-            y_m: number;
-        };
         /** @description The answer to an edit or a publication. */
         GdbAnswer: {
             /**
@@ -2146,7 +2106,7 @@ export interface components {
         NewAlignment: {
             /** @description What for, at most 500 bytes. */
             comment?: string;
-            pose?: components["schemas"]["FramePose"] | null;
+            pose?: components["schemas"]["UncertainPose"] | null;
         };
         /** @description A level to be made. */
         NewLevel: {
@@ -2702,7 +2662,7 @@ export interface components {
             /** @description When, by the robot's clock, RFC 3339. */
             observed_at: string;
             /** @description Where it is, or where it may be, likeliest first, at most 16: one if `unique` or `tracked`, none if `no_match`. */
-            places: components["schemas"]["FixPlace"][];
+            places: components["schemas"]["UncertainPose"][];
             /** @description Ids of the map's segments that its last look was matched with, at most 1024. */
             segments?: string[];
         };
@@ -2992,6 +2952,26 @@ export interface components {
              * @description What the second candidate comes to, as a share of the first.
              */
             runner_up: number;
+        };
+        /** @description Where something is on a level, or may be, with its covariance. */
+        UncertainPose: {
+            /** @description Covariance of (x, y, heading), row by row. */
+            covariance: number[][];
+            /**
+             * Format: double
+             * @description Heading, counter-clockwise from x.
+             */
+            heading_rad: number;
+            /**
+             * Format: double
+             * @description Position, x.
+             */
+            x_m: number;
+            /**
+             * Format: double
+             * @description Position, y.
+             */
+            y_m: number;
         };
         /** @description How a revert was undone. */
         Undone: {

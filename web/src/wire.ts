@@ -43,10 +43,10 @@ export type VectorPatch = Exactly<
 >;
 
 export type LastPose = Exactly<Wire["LastPose"], { covariance: Matrix3 }>;
-export type FixPlace = Exactly<Wire["FixPlace"], { covariance: Matrix3 }>;
+export type UncertainPose = Exactly<Wire["UncertainPose"], { covariance: Matrix3 }>;
 export type RobotFix = Exactly<
   Wire["RobotFix"],
-  { places: FixPlace[]; landmarks_m?: [number, number][] }
+  { places: UncertainPose[]; landmarks_m?: [number, number][] }
 >;
 export type RobotDescription = Exactly<
   Wire["RobotDescription"],

@@ -2,6 +2,7 @@
 
 use mapfold_map::geometry::{Level, Odom, Point, Pose, Robot, UncertainPose};
 use mapfold_map::level::FeatureId;
+use mapfold_schema::border::alignment::wire_pose;
 use mapfold_schema::border::feature_id;
 use mapfold_schema::instant::to_rfc3339;
 use mapfold_schema::v1;
@@ -74,22 +75,19 @@ impl Whereabouts {
 
     /// What it knows of its place on a level, to be reported; nothing before the first look.
     pub fn report(&self, level: &str, time_s: f64) -> Option<v1::RobotFix> {
-        let place = |pose: &UncertainPose<Level, Robot>| v1::FixPlace {
-            x_m: pose.pose.x,
-            y_m: pose.pose.y,
-            heading_rad: pose.pose.heading(),
-            covariance: pose.covariance.rows(),
-        };
         let (kind, places) = match self.last.as_ref()? {
             Localized::NotDue => return None,
-            Localized::Tracked(pose, _) => (v1::FixKind::Tracked, vec![place(pose)]),
-            Localized::Doubted(pose) => (v1::FixKind::Ambiguous, vec![place(pose)]),
+            Localized::Tracked(pose, _) => (v1::FixKind::Tracked, vec![wire_pose(pose)]),
+            Localized::Doubted(pose) => (v1::FixKind::Ambiguous, vec![wire_pose(pose)]),
             Localized::Sought(Fix::Unique(found)) => {
-                (v1::FixKind::Unique, vec![place(&found.level_from_robot)])
+                (v1::FixKind::Unique, vec![wire_pose(&found.level_from_robot)])
             }
             Localized::Sought(Fix::Ambiguous(candidates)) => {
                 let likeliest = candidates.iter().take(REPORTED_MAX);
-                (v1::FixKind::Ambiguous, likeliest.map(|c| place(&c.level_from_robot)).collect())
+                (
+                    v1::FixKind::Ambiguous,
+                    likeliest.map(|c| wire_pose(&c.level_from_robot)).collect(),
+                )
             }
             Localized::Sought(Fix::NoMatch) => (v1::FixKind::NoMatch, Vec::new()),
         };

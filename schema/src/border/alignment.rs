@@ -1,7 +1,7 @@
 //! Where robots' own frames lie, between the wire and the map's types.
 
 use mapfold_map::alignment::{Alignment, AlignmentConfig, Candidate, Doubt};
-use mapfold_map::geometry::{Covariance, Level, Odom, UncertainPose};
+use mapfold_map::geometry::{Covariance, UncertainPose};
 
 use super::violations::Violation;
 use crate::v1;
@@ -9,10 +9,10 @@ use crate::v1;
 /// Heading of a pose: a full turn either way.
 const HEADING_MAX_RAD: f64 = std::f64::consts::TAU;
 
-/// A pose of a frame.
-pub fn wire_pose(level_from_odom: &UncertainPose<Level, Odom>) -> v1::FramePose {
-    let UncertainPose { pose, covariance } = level_from_odom;
-    v1::FramePose {
+/// A pose in some frame.
+pub fn wire_pose<A: Copy, B: Copy>(pose: &UncertainPose<A, B>) -> v1::UncertainPose {
+    let UncertainPose { pose, covariance } = pose;
+    v1::UncertainPose {
         x_m: pose.x,
         y_m: pose.y,
         heading_rad: pose.heading(),
@@ -24,7 +24,7 @@ pub fn wire_pose(level_from_odom: &UncertainPose<Level, Odom>) -> v1::FramePose 
 ///
 /// # Errors
 /// What is wrong with it: it must be finite and no farther than `coordinate_max_m`, its covariance positive semi-definite.
-pub fn check_pose(pose: &v1::FramePose, coordinate_max_m: f64) -> Result<(), Vec<Violation>> {
+pub fn check_pose(pose: &v1::UncertainPose, coordinate_max_m: f64) -> Result<(), Vec<Violation>> {
     let mut wrong = Vec::new();
     let mut expect = |fine: bool, pointer: &str, detail: String| {
         if !fine {

@@ -4,19 +4,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-/// `level_from_odom`: where the origin of a robot's own frame lies on the level.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct FramePose {
-    /// Position, x.
-    pub x_m: f64,
-    /// Position, y.
-    pub y_m: f64,
-    /// Heading, counter-clockwise from x.
-    pub heading_rad: f64,
-    /// Covariance of (x, y, heading), row by row.
-    pub covariance: [[f64; 3]; 3],
-}
+use super::UncertainPose;
 
 /// What speaks against a proposed alignment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -38,7 +26,7 @@ pub enum AlignmentDoubt {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct AlignmentCandidate {
     /// The pose.
-    pub pose: FramePose,
+    pub pose: UncertainPose,
     /// Share of the walls of the robot's map that lie where the level knows something.
     pub overlap: f64,
     /// Wall on which both maps agree, counted on both of them together.
@@ -77,8 +65,8 @@ pub struct Alignment {
     pub revision: i64,
     /// The frame.
     pub frame: Uuid,
-    /// Where it lies.
-    pub pose: FramePose,
+    /// `level_from_odom`: where it lies.
+    pub pose: UncertainPose,
     /// When it was accepted.
     pub at: String,
     /// Public id of the token that accepted it; `rule` if the server did by itself.
@@ -109,7 +97,7 @@ pub struct Alignments {
 pub struct NewAlignment {
     /// The pose; if absent, that of the first candidate, which must be certain then.
     #[serde(default)]
-    pub pose: Option<FramePose>,
+    pub pose: Option<UncertainPose>,
     /// What for, at most 500 bytes.
     #[serde(default)]
     pub comment: String,

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::{SensorKind, SensorProfile};
+use super::{SensorKind, SensorProfile, UncertainPose};
 
 /// A robot to be enrolled.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -53,7 +53,7 @@ pub struct RobotFix {
     /// How well it knows.
     pub kind: FixKind,
     /// Where it is, or where it may be, likeliest first, at most 16: one if `unique` or `tracked`, none if `no_match`.
-    pub places: Vec<FixPlace>,
+    pub places: Vec<UncertainPose>,
     /// Ids of the map's segments that its last look was matched with, at most 1024.
     #[serde(default)]
     pub segments: Vec<String>,
@@ -74,20 +74,6 @@ pub enum FixKind {
     Ambiguous,
     /// Nothing on the map fits what it sees.
     NoMatch,
-}
-
-/// Where a robot may be.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct FixPlace {
-    /// Position, x.
-    pub x_m: f64,
-    /// Position, y.
-    pub y_m: f64,
-    /// Heading.
-    pub heading_rad: f64,
-    /// Covariance of (x, y, heading).
-    pub covariance: [[f64; 3]; 3],
 }
 
 /// Whether what a robot sends goes into the map.

@@ -118,7 +118,7 @@ impl LevelHandle {
     pub async fn align(
         &self,
         frame: Uuid,
-        pose: Option<v1::FramePose>,
+        pose: Option<v1::UncertainPose>,
         entry: &NewEntry,
     ) -> Result<v1::Alignment, AlignmentError> {
         let pose = if let Some(pose) = pose {
@@ -137,7 +137,7 @@ impl LevelHandle {
     async fn put_in(
         &self,
         frame: Uuid,
-        pose: Option<&v1::FramePose>,
+        pose: Option<&v1::UncertainPose>,
         entry: &NewEntry,
     ) -> Result<v1::Alignment, AlignmentError> {
         let store = &self.shared.store;

@@ -11,8 +11,8 @@ use mapfold_schema::border::wire_contribution;
 use mapfold_schema::route;
 use mapfold_schema::v1::{
     self, Alignment, AlignmentDoubt, Alignments, ContributionEntry, ContributionPage,
-    ContributionState, FramePose, NewAlignment, NewRevert, Receipt, Revert, RobotDescription,
-    RobotState, RobotUpdate, UploadAnswer,
+    ContributionState, NewAlignment, NewRevert, Receipt, Revert, RobotDescription, RobotState,
+    RobotUpdate, UploadAnswer,
 };
 use mapfold_server::maintenance::verify;
 use mapfold_server::store::{Store, sqlite_url};
@@ -56,8 +56,8 @@ async fn entry(floor: &Level, number: u64) -> ContributionEntry {
     page.contributions.into_iter().find(|entry| entry.id == id(number)).unwrap()
 }
 
-fn pose() -> FramePose {
-    FramePose {
+fn pose() -> v1::UncertainPose {
+    v1::UncertainPose {
         x_m: 4.0,
         y_m: -3.0,
         heading_rad: 1.25,
@@ -65,7 +65,7 @@ fn pose() -> FramePose {
     }
 }
 
-fn at(pose: FramePose) -> NewAlignment {
+fn at(pose: v1::UncertainPose) -> NewAlignment {
     NewAlignment { pose: Some(pose), comment: "saw it there".to_owned() }
 }
 
@@ -156,7 +156,7 @@ pub(crate) async fn story(server: &Server, floor: &Level) -> [Vec<u8>; 2] {
     assert_eq!(delete(&admin, &path).await.code(409), "frame_not_aligned");
 
     // Elsewhere, from what is held.
-    let elsewhere = FramePose { x_m: -6.0, heading_rad: -2.0, ..pose() };
+    let elsewhere = v1::UncertainPose { x_m: -6.0, heading_rad: -2.0, ..pose() };
     let made: Alignment = admin.post(&path, &at(elsewhere)).await.expect(201).data();
     assert_eq!(made.contributions, 3);
     floor.folded(made.revision).await;

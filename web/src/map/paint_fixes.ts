@@ -4,8 +4,9 @@
 import { poseEllipse95 } from "../geometry";
 import { strokeOf, type Theme } from "../palette";
 import { fixHere, type State } from "../state";
-import type { FixPlace } from "../wire";
+import type { UncertainPose } from "../wire";
 import { xScreenFromLevel, yScreenFromLevel, type Frame } from "./frame";
+import { traceArrow } from "./paint_robots";
 import { tracePieces } from "./paint_selection";
 
 /** Half the length of an arrow at a place that is one of several. */
@@ -27,7 +28,7 @@ export function paintFixes(frame: Frame, state: State, theme: Theme): void {
   }
 }
 
-function paintCandidate(frame: Frame, place: FixPlace, { colour, theme }: { colour: string; theme: Theme }): void {
+function paintCandidate(frame: Frame, place: UncertainPose, { colour, theme }: { colour: string; theme: Theme }): void {
   const { pen } = frame;
   const [x, y] = [xScreenFromLevel(frame, place.x_m), yScreenFromLevel(frame, place.y_m)];
   const ellipse = poseEllipse95(place.covariance);
@@ -43,12 +44,7 @@ function paintCandidate(frame: Frame, place: FixPlace, { colour, theme }: { colo
   pen.stroke();
   pen.rotate(-place.heading_rad);
   pen.setLineDash([]);
-  pen.beginPath();
-  pen.moveTo(ARROW_PX, 0);
-  pen.lineTo(-ARROW_PX * 0.7, ARROW_PX * 0.6);
-  pen.lineTo(-ARROW_PX * 0.35, 0);
-  pen.lineTo(-ARROW_PX * 0.7, -ARROW_PX * 0.6);
-  pen.closePath();
+  traceArrow(pen, ARROW_PX);
   pen.fillStyle = theme.label;
   pen.fill();
   pen.stroke();

@@ -76,12 +76,7 @@ function paintArrow(frame: Frame, mark: RobotMark, theme: Theme): void {
   pen.translate(xScreenFromLevel(frame, pose.x_m), yScreenFromLevel(frame, pose.y_m));
   pen.rotate(-pose.heading_rad);
   pen.lineJoin = "round";
-  pen.beginPath();
-  pen.moveTo(ARROW_PX, 0);
-  pen.lineTo(-ARROW_PX * 0.8, ARROW_PX * 0.75);
-  pen.lineTo(-ARROW_PX * 0.4, 0);
-  pen.lineTo(-ARROW_PX * 0.8, -ARROW_PX * 0.75);
-  pen.closePath();
+  traceArrow(pen, ARROW_PX);
   pen.strokeStyle = theme.label;
   pen.lineWidth = 6;
   pen.stroke();
@@ -91,4 +86,14 @@ function paintArrow(frame: Frame, mark: RobotMark, theme: Theme): void {
   pen.fill();
   pen.stroke();
   pen.restore();
+}
+
+/** Begins a path that is an arrow along x, half of it so long. */
+export function traceArrow(pen: Frame["pen"], halfPx: number): void {
+  pen.beginPath();
+  pen.moveTo(halfPx, 0);
+  pen.lineTo(-halfPx * 0.8, halfPx * 0.75);
+  pen.lineTo(-halfPx * 0.4, 0);
+  pen.lineTo(-halfPx * 0.8, -halfPx * 0.75);
+  pen.closePath();
 }
