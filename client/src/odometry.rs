@@ -30,6 +30,11 @@ impl OdometryNoise {
         turn_per_turn: 1.5 * std::f64::consts::PI / 180.0,
     };
 
+    /// What a way and the turns on it add to the variance of the heading, square radians.
+    pub(crate) fn heading_variance(&self, way: f64, turned: f64) -> f64 {
+        self.turn_per_metre.powi(2) * way + self.turn_per_turn.powi(2) * turned.abs()
+    }
+
     /// A step that the wheels counted, with what it adds to the covariance, in the frame in which it began.
     #[must_use]
     pub fn of_step(&self, step: &Pose<Robot, Robot>) -> UncertainPose<Robot, Robot> {
@@ -72,8 +77,7 @@ impl DeadReckoning {
 fn step_covariance(step: &Pose<Robot, Robot>, noise: &OdometryNoise) -> Covariance<3> {
     let way = step.position();
     let d = way.norm();
-    let turn =
-        noise.turn_per_metre.powi(2) * d + noise.turn_per_turn.powi(2) * step.heading().abs();
+    let turn = noise.heading_variance(d, step.heading());
     let along = noise.along.powi(2) * d;
     let slip = noise.across.powi(2) * d;
     // In axes along and across the way; a heading error turns the way about its beginning.

@@ -28,7 +28,7 @@ pub use crate::odometry::{DeadReckoning, OdometryNoise};
 
 use crate::emulation::EmulationConfig;
 use crate::evidence::{Canvas, ScannerEvidenceConfig, SonarEvidenceConfig};
-use crate::log::{Observation, Reading};
+use crate::log::{Log, Observation, Reading};
 use crate::perception::Perception;
 use crate::sensor::{ScannerProfile, Sensors, SonarProfile};
 
@@ -94,6 +94,21 @@ pub struct SurveyorConfig {
 }
 
 impl SurveyorConfig {
+    /// What a robot makes of a log at its own corrected poses, with what is usual of all else.
+    pub fn of_log(robot: &str, sensors: Sensors, log: &Log, resolution: f64) -> Self {
+        Self {
+            robot: robot.to_owned(),
+            sensors,
+            emulate_sonar: false,
+            poses: PoseSource::Log,
+            pose_sd: PoseSd::CORRECTED_LOG,
+            provenance: Provenance::SharedMap,
+            odometry: OdometryNoise::STANDARD,
+            resolution,
+            source: log.digest,
+        }
+    }
+
     /// Where the robot starts that has to be told: where the log says, or else at the origin of its wheels' frame.
     fn start(
         &self,

@@ -8,9 +8,7 @@ use std::path::PathBuf;
 use mapfold_client::emulation::{Chance, EmulationConfig, emulate};
 use mapfold_client::log::{Log, Observation, ScannerMake, carmen};
 use mapfold_client::perception::{self, BeamUse};
-use mapfold_client::robot::{
-    Look, OdometryNoise, Passed, PoseSd, PoseSource, Surveyor, SurveyorConfig,
-};
+use mapfold_client::robot::{Look, Passed, PoseSd, PoseSource, Surveyor, SurveyorConfig};
 use mapfold_client::sensor::{Ring, Sensors, preset};
 use mapfold_map::level::Provenance;
 use mapfold_map::raster::SensorClass;
@@ -28,17 +26,7 @@ fn log(name: &str) -> Log {
 }
 
 fn config(log: &Log, sensors: Sensors) -> SurveyorConfig {
-    SurveyorConfig {
-        robot: "anna".to_owned(),
-        sensors,
-        emulate_sonar: false,
-        poses: PoseSource::Log,
-        pose_sd: PoseSd::CORRECTED_LOG,
-        provenance: Provenance::SharedMap,
-        odometry: OdometryNoise::STANDARD,
-        resolution: 0.05,
-        source: log.digest,
-    }
+    SurveyorConfig::of_log("anna", sensors, log, 0.05)
 }
 
 fn survey(log: &Log, config: &SurveyorConfig) -> Vec<Look> {

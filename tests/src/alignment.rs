@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 
 use mapfold_client::log::{Log, Observation, carmen};
 use mapfold_client::replay::SensorChoice;
-use mapfold_client::robot::{OdometryNoise, PoseSd, PoseSource, Surveyor, SurveyorConfig};
+use mapfold_client::robot::{Surveyor, SurveyorConfig};
 use mapfold_map::alignment::{Alignment, AlignmentConfig, Chart, align};
 use mapfold_map::geometry::{Level as LevelFrame, Odom, Point, Pose, difference};
-use mapfold_map::level::{Contribution, Level, LevelConfig, Provenance};
+use mapfold_map::level::{Contribution, Level, LevelConfig};
 use mapfold_map::raster::{EvidenceRun, TileIndex};
 
 use crate::statistics::quantile;
-use crate::{Error, report};
+use crate::{Error, logs, report};
 
 /// Cells of the maps, metres.
 const RESOLUTION_M: f64 = 0.05;
@@ -41,17 +41,8 @@ struct Recorded {
 
 fn surveyor(path: &Path, log: &Log, robot: &str) -> Result<Surveyor, Error> {
     let fault = |fault: String| Error::Log { path: path.to_owned(), line: 0, fault };
-    let config = SurveyorConfig {
-        robot: robot.to_owned(),
-        sensors: SensorChoice::default().choose(log).map_err(|e| fault(e.to_string()))?,
-        emulate_sonar: false,
-        poses: PoseSource::Log,
-        pose_sd: PoseSd::CORRECTED_LOG,
-        provenance: Provenance::SharedMap,
-        odometry: OdometryNoise::STANDARD,
-        resolution: RESOLUTION_M,
-        source: log.digest,
-    };
+    let sensors = SensorChoice::default().choose(log).map_err(|e| fault(e.to_string()))?;
+    let config = SurveyorConfig::of_log(robot, sensors, log, RESOLUTION_M);
     Surveyor::new(config, 0).map_err(|e| fault(e.to_string()))
 }
 
@@ -202,18 +193,12 @@ impl Tried {
 /// A log or the page cannot be read or written.
 pub fn table(page: &Path, data: Option<&Path>) -> Result<Vec<String>, Error> {
     let config = AlignmentConfig::STANDARD;
-    let killian = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/killian.log.gz");
-    let further = ["intel", "aces", "csail", "freiburg-101", "fhw", "belgioioso"];
-    let mut logs: Vec<(String, PathBuf)> = Vec::new();
-    for name in further {
-        let path = data.map(|data| data.join(format!("logs/{name}.log.gz")));
-        logs.extend(path.filter(|path| path.is_file()).map(|path| (format!("{name} *"), path)));
-    }
-    logs.push(("killian".to_owned(), killian));
+    let mut all = logs::further(data);
+    all.push(("killian".to_owned(), logs::killian()));
     let mut rows = Vec::new();
     let mut faults = Vec::new();
     let mut sums = vec![Tried::default(); OVERLAPS.len()];
-    for (name, path) in logs {
+    for (name, path) in all {
         let recorded = Recorded::read(&path)?;
         for (overlap, sum) in OVERLAPS.iter().zip(&mut sums) {
             let mut tried = Tried::default();

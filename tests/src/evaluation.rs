@@ -7,7 +7,7 @@ use crate::carmen::Log;
 use crate::database::Database;
 use crate::simulation::{Recording, Scanner, hall, office, record};
 use crate::trial::{self, Outcome};
-use crate::{Error, fleet, report};
+use crate::{Error, fleet, logs, report};
 
 /// Logs with corrected poses that may lie beside the repository. The `wean` logs there have raw
 /// odometry only.
@@ -64,7 +64,7 @@ pub async fn maps(
 
 /// The committed log, and either the further ones or simulated worlds.
 fn sources(data: Option<&Path>, folder: &Path) -> Result<Vec<Source>, Error> {
-    let committed = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/killian.log.gz");
+    let committed = logs::killian();
     let mut sources = vec![Source { name: "killian".to_owned(), path: committed }];
     let further = data.map(|data| data.join("logs")).filter(|logs| logs.is_dir());
     if let Some(logs) = further {

@@ -7,13 +7,13 @@ mod plate;
 
 use std::path::Path;
 
-use crate::Error;
 use crate::carmen::Log;
 use crate::database::Database;
 use crate::level::{Level, Replica};
 use crate::plane::Point;
 use crate::robot::{Robot, Target};
 use crate::server::Server;
+use crate::{Error, logs};
 
 /// One robot's way through the hallway: a stretch of the log.
 #[derive(Debug, Clone)]
@@ -99,7 +99,7 @@ pub async fn draw(log: &Path, hallway: &Hallway) -> Result<Figure, Error> {
 /// # Errors
 /// As [`draw`]; the file cannot be written.
 pub async fn write(out: &Path) -> Result<(), Error> {
-    let log = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/killian.log.gz");
+    let log = logs::killian();
     let figure = draw(&log, &HALLWAY).await?;
     std::fs::write(out, figure.svg).map_err(|e| Error::file(out, e))
 }

@@ -10,14 +10,14 @@ use std::path::Path;
 
 use mapfold_client::log::carmen;
 use mapfold_client::replay::SensorChoice;
-use mapfold_client::robot::{OdometryNoise, PoseSd, PoseSource, Surveyor, SurveyorConfig};
-use mapfold_map::level::{Contribution, Level, LevelConfig, Provenance};
+use mapfold_client::robot::{Surveyor, SurveyorConfig};
+use mapfold_map::level::{Contribution, Level, LevelConfig};
 use tokio::time::Instant;
 
 use self::cost::Cost;
 use self::rooms::{RESOLUTION_M, Rooms};
 use crate::statistics::quantile;
-use crate::{Error, report};
+use crate::{Error, logs, report};
 
 /// Segments of the maps in which the cost of one more contribution is measured.
 const SEGMENTS: [u64; 4] = [1_000, 10_000, 100_000, 1_000_000];
@@ -75,17 +75,7 @@ fn log(path: &Path) -> Result<(usize, [f64; 2]), Error> {
     let fault = |fault: String| Error::Log { path: path.to_owned(), line: 0, fault };
     let log = carmen::read(path).map_err(|e| fault(e.to_string()))?;
     let sensors = SensorChoice::default().choose(&log).map_err(|e| fault(e.to_string()))?;
-    let config = SurveyorConfig {
-        robot: "robot".to_owned(),
-        sensors,
-        emulate_sonar: false,
-        poses: PoseSource::Log,
-        pose_sd: PoseSd::CORRECTED_LOG,
-        provenance: Provenance::SharedMap,
-        odometry: OdometryNoise::STANDARD,
-        resolution: RESOLUTION_M,
-        source: log.digest,
-    };
+    let config = SurveyorConfig::of_log("robot", sensors, &log, RESOLUTION_M);
     let mut surveyor = Surveyor::new(config, 0).map_err(|e| fault(e.to_string()))?;
     let looks: Vec<Contribution> = log
         .readings
@@ -117,7 +107,7 @@ pub fn tables(page: &Path, data: Option<&Path>) -> Result<Vec<String>, Error> {
     // Before anything else leaves free memory behind that would not count for them.
     let costs = cost::measure(&SEGMENTS, MEASURED, IN_A_ROW);
     let least = &costs[0];
-    let killian = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/killian.log.gz");
+    let killian = logs::killian();
     let intel = data.map(|data| data.join("logs/intel.log.gz")).filter(|path| path.is_file());
     let mut logs = Vec::new();
     for (name, path) in [("intel *", intel), ("killian", Some(killian))] {

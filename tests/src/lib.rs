@@ -50,6 +50,7 @@ pub mod growth;
 pub mod honesty;
 pub mod level;
 pub mod localization;
+mod logs;
 pub mod meter;
 pub mod page;
 pub mod places;

@@ -1,19 +1,19 @@
 //! Finding places on recorded logs: how far must a robot drive that knows nothing, on a map that it did not help to
 //! make, and is it ever told a wrong place?
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use mapfold_client::localization::{Fix, Seeker, SeekerConfig, view};
 use mapfold_client::log::{Log, Observation, carmen};
 use mapfold_client::perception::Perception;
 use mapfold_client::replay::SensorChoice;
-use mapfold_client::robot::{OdometryNoise, PoseSd, PoseSource, Surveyor, SurveyorConfig};
+use mapfold_client::robot::{Surveyor, SurveyorConfig};
 use mapfold_map::geometry::{Level as LevelFrame, Odom, Pose, Robot, difference};
-use mapfold_map::level::{Contribution, Level, LevelConfig, Provenance};
+use mapfold_map::level::{Contribution, Level, LevelConfig};
 use mapfold_map::places::{LikelihoodField, PlacesConfig, View};
 
 use crate::statistics::quantile;
-use crate::{Error, report};
+use crate::{Error, logs, report};
 
 /// Cells of the maps, metres.
 const RESOLUTION_M: f64 = 0.05;
@@ -56,17 +56,7 @@ fn looks(path: &Path) -> Result<Vec<Look>, Error> {
     let log: Log = carmen::read(path).map_err(|e| fault(e.to_string()))?;
     let sensors = SensorChoice::default().choose(&log).map_err(|e| fault(e.to_string()))?;
     let profile = sensors.scanner.clone().ok_or_else(|| fault("no scanner".to_owned()))?;
-    let config = SurveyorConfig {
-        robot: "robot".to_owned(),
-        sensors,
-        emulate_sonar: false,
-        poses: PoseSource::Log,
-        pose_sd: PoseSd::CORRECTED_LOG,
-        provenance: Provenance::SharedMap,
-        odometry: OdometryNoise::STANDARD,
-        resolution: RESOLUTION_M,
-        source: log.digest,
-    };
+    let config = SurveyorConfig::of_log("robot", sensors, &log, RESOLUTION_M);
     let mut surveyor = Surveyor::new(config, 0).map_err(|e| fault(e.to_string()))?;
     let mut perception = Perception::for_scanner(&profile);
     let mut looks = Vec::new();
@@ -161,15 +151,10 @@ fn drive(looks: &[Look], field: &LikelihoodField, now: &dyn Fn() -> f64, into: &
 pub fn table(page: &Path, data: Option<&Path>) -> Result<Vec<String>, Error> {
     let started = tokio::time::Instant::now();
     let now = || started.elapsed().as_secs_f64();
-    let killian = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/killian.log.gz");
-    let further = ["intel", "aces", "csail", "freiburg-101", "fhw", "belgioioso"];
-    let mut logs: Vec<(String, PathBuf)> = vec![("killian".to_owned(), killian)];
-    for name in further {
-        let path = data.map(|data| data.join(format!("logs/{name}.log.gz")));
-        logs.extend(path.filter(|path| path.is_file()).map(|path| (format!("{name} *"), path)));
-    }
+    let mut recorded = vec![("killian".to_owned(), logs::killian())];
+    recorded.extend(logs::further(data));
     let (mut rows, mut wrong, mut all) = (Vec::new(), 0, 0);
-    for (name, path) in logs {
+    for (name, path) in recorded {
         let looks = looks(&path)?;
         for (part, mapped) in
             [("every other block", Mapped::OtherBlocks), ("first half", Mapped::FirstHalf)]

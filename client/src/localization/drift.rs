@@ -40,9 +40,8 @@ pub(super) struct Drift {
     config: DriftConfig,
     mean: Vector2<f64>,
     covariance: Matrix2<f64>,
-    /// Since the last known place: metres driven, and what the wheels counted.
+    /// What the wheels counted since the last known place: metres driven, and radians turned.
     way: f64,
-    counted: Pose<Robot, Robot>,
     turned: f64,
 }
 
@@ -54,7 +53,6 @@ impl Drift {
             mean: Vector2::zeros(),
             covariance: Matrix2::from_diagonal(&sds.component_mul(&sds)),
             way: 0.0,
-            counted: Pose::new(0.0, 0.0, 0.0),
             turned: 0.0,
         }
     }
@@ -64,7 +62,6 @@ impl Drift {
         let way = step.position().norm();
         self.way += way;
         self.turned += step.heading();
-        self.counted = self.counted.compose(step);
         let excess = self.mean.dot(&Vector2::new(way, step.heading()));
         // The way bends by half of what it turns.
         let half: Pose<Robot, Robot> = Pose::new(0.0, 0.0, -0.5 * excess);
@@ -75,11 +72,9 @@ impl Drift {
     /// The robot is at a known place and was at another one when it was told so last: what truly lay between them.
     pub(super) fn learn(&mut self, moved: &Pose<Robot, Robot>, noise: &OdometryNoise) {
         let row = Vector2::new(self.way, self.turned);
-        let excess = difference(self.counted.heading(), moved.heading());
-        let counted_sd = (noise.turn_per_metre.powi(2) * self.way
-            + noise.turn_per_turn.powi(2) * self.turned.abs())
-        .sqrt();
-        let variance = self.config.heading_sd.powi(2) + counted_sd.powi(2);
+        let excess = difference(self.turned, moved.heading());
+        let counted = noise.heading_variance(self.way, self.turned);
+        let variance = self.config.heading_sd.powi(2) + counted;
         let expected = variance + row.dot(&(self.covariance * row));
         let off = excess - self.mean.dot(&row);
         let is_told = self.way <= self.config.way_max
@@ -95,7 +90,7 @@ impl Drift {
 
     /// The robot is at a known place, and it is not known where it was before.
     pub(super) fn forget_way(&mut self) {
-        (self.way, self.turned, self.counted) = (0.0, 0.0, Pose::new(0.0, 0.0, 0.0));
+        (self.way, self.turned) = (0.0, 0.0);
     }
 }
 

@@ -197,9 +197,9 @@ impl Work {
         if located == Err(Passed::Unplaced)
             || self.probation.finds().is_some_and(|f| Some(f) != finds)
         {
-            self.surveyed.placed -= self.probation.len();
-            self.pass(Passed::Doubted, self.probation.len());
-            self.probation.fail();
+            let doubted = self.probation.fail();
+            self.surveyed.placed -= doubted;
+            self.pass(Passed::Doubted, doubted);
         }
         let pose = match located {
             Ok(pose) => pose,

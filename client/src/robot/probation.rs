@@ -31,19 +31,9 @@ impl Probation {
         self.waiting.drain(..count).collect()
     }
 
-    /// The robot is lost, or has found another place: what waits is not to be believed, and gone.
-    pub fn fail(&mut self) {
-        self.waiting.clear();
-    }
-
-    /// How many looks wait.
-    pub fn len(&self) -> u64 {
-        self.waiting.len() as u64
-    }
-
-    /// Whether none waits.
-    pub fn is_empty(&self) -> bool {
-        self.waiting.is_empty()
+    /// The robot is lost, or has found another place: what waits is not to be believed, and gone. How many looks it was.
+    pub fn fail(&mut self) -> u64 {
+        self.waiting.drain(..).count() as u64
     }
 
     /// The robot stops and is not lost: what waits is believed.
