@@ -23,6 +23,9 @@ pub const FILE_BYTES_MAX: usize = 64 << 20;
 /// Reasons for what is left out that are told.
 const LEFT_OUT_MAX: usize = 64;
 
+/// The place of what is wrong with a document as a whole.
+pub(super) const DOCUMENT: &str = "the document";
+
 /// Why a file is not taken: what is wrong, and where.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{place}: {fault}")]
@@ -44,7 +47,9 @@ impl FileFault {
     /// Things that are wrong place by place.
     pub fn of(errors: Vec<Violation>) -> Self {
         let first = errors.first().map(|v| (v.pointer.clone(), v.detail.clone()));
-        let (place, fault) = first.unwrap_or_default();
+        let (pointer, fault) = first.unwrap_or_default();
+        // The empty pointer is the whole of a document.
+        let place = if pointer.is_empty() { DOCUMENT.to_owned() } else { pointer };
         Self { place, fault, errors }
     }
 }

@@ -11,7 +11,7 @@ use mapfold_schema::codec::{self, DecodeError};
 use mapfold_schema::v1::{CollectionWord, GdbDocument, GdbPrototype, ModelFormat};
 use uuid::Uuid;
 
-use super::incoming::{FileFault, Found, Incoming};
+use super::incoming::{DOCUMENT, FileFault, Found, Incoming};
 use super::outgoing::Outgoing;
 
 /// What it is sent as.
@@ -55,7 +55,7 @@ pub fn read(
     let mut found = Found::new(ModelFormat::Jsonfg, frame, bytes)?;
     let document: GdbDocument = codec::from_json(bytes).map_err(|error| match error {
         DecodeError::Shape(violation) => FileFault::of(vec![violation]),
-        other => FileFault::at("the document", other.to_string()),
+        other => FileFault::at(DOCUMENT, other.to_string()),
     })?;
     let known = library.iter().filter_map(|(name, prototype)| {
         Some((PrototypeName::from(name.as_str()), map_prototype(prototype).ok()?))

@@ -95,6 +95,21 @@ proptest! {
     }
 }
 
+/// What is wrong before anything can be named is wrong with the document.
+#[test]
+fn text_that_is_none_is_refused_with_a_place() {
+    for bytes in [
+        &b"{\"\xff\":0}"[..],
+        b"{\"type\":\"\xff\"}",
+        b"{\"features\":[{\"id\":\"\xff\"}]}",
+        b"[]",
+        b"7",
+    ] {
+        let fault = read(bytes, FRAME, &BTreeMap::new()).unwrap_err();
+        assert!(!fault.place.is_empty() && !fault.fault.is_empty(), "{fault:?}");
+    }
+}
+
 #[test]
 fn deep_documents_are_refused() {
     for open in ["[", "{\"a\":", "{\"type\":\"FeatureCollection\",\"features\":["] {
