@@ -6,6 +6,7 @@ mod evidence;
 mod log_odds;
 mod pen;
 mod slices;
+mod sums;
 mod tile;
 mod together;
 
@@ -16,6 +17,7 @@ pub use log_odds::LogOdds;
 pub use pen::{PatchPen, RowRuns};
 pub(crate) use slices::Stack;
 pub use slices::{Slice, SliceConfig, SliceKey};
+pub use sums::{Packed, Sums};
 pub use tile::{Cell, TILE_CELLS, TILE_SIDE, Tile, TileIndex, TileKey};
 pub use together::{Layered, Said, together};
 

@@ -12,6 +12,7 @@ use mapfold_client::log::carmen;
 use mapfold_client::replay::SensorChoice;
 use mapfold_client::robot::{Surveyor, SurveyorConfig};
 use mapfold_map::level::{Contribution, Level, LevelConfig};
+use mapfold_map::raster::TILE_SIDE;
 use tokio::time::Instant;
 
 use self::cost::Cost;
@@ -70,8 +71,35 @@ impl Reverts {
     }
 }
 
-/// Contributions of a whole log, and how many a second are folded, one by one and all at once.
-fn log(path: &Path) -> Result<(usize, [f64; 2]), Error> {
+/// What folding a whole log costs.
+struct Folded {
+    contributions: usize,
+    /// How many a second, one by one and all at once.
+    rates: [f64; 2],
+    /// Tiles of the map, all layers.
+    tiles: usize,
+    /// Bytes of their sums, as they are kept once later looks have begun slices of their own.
+    packed: usize,
+}
+
+impl Folded {
+    fn row(&self, name: &str) -> Vec<String> {
+        let [single, bulk] = self.rates;
+        let tile_m2 = (TILE_SIDE as f64 * RESOLUTION_M).powi(2);
+        let bytes = self.packed as f64 / self.tiles as f64;
+        vec![
+            name.to_owned(),
+            self.contributions.to_string(),
+            format!("{single:.0}"),
+            format!("{bulk:.0}"),
+            self.tiles.to_string(),
+            format!("{bytes:.0}"),
+            format!("{:.2}", 365.0 * bytes / tile_m2 / 1e6),
+        ]
+    }
+}
+
+fn log(path: &Path) -> Result<Folded, Error> {
     let fault = |fault: String| Error::Log { path: path.to_owned(), line: 0, fault };
     let log = carmen::read(path).map_err(|e| fault(e.to_string()))?;
     let sensors = SensorChoice::default().choose(&log).map_err(|e| fault(e.to_string()))?;
@@ -96,7 +124,16 @@ fn log(path: &Path) -> Result<(usize, [f64; 2]), Error> {
             .collect();
         looks.len() as f64 / quantile(&times, 0.5)
     };
-    Ok((looks.len(), [rate(1), rate(looks.len().max(1))]))
+    let mut level = Level::new(LevelConfig::standard(RESOLUTION_M));
+    let slices = level.fold(&looks).slices;
+    let packed =
+        slices.iter().filter_map(|at| level.sums(at)).map(|sums| sums.clone().packed().bytes());
+    Ok(Folded {
+        contributions: looks.len(),
+        rates: [rate(1), rate(looks.len().max(1))],
+        tiles: level.map().tiles.len(),
+        packed: packed.sum(),
+    })
 }
 
 /// Rewrites the tables `growth` of the report and answers what is not as it must be.
@@ -112,10 +149,7 @@ pub fn tables(page: &Path, data: Option<&Path>) -> Result<Vec<String>, Error> {
     let mut logs = Vec::new();
     for (name, path) in [("intel *", intel), ("killian", Some(killian))] {
         let Some(path) = path else { continue };
-        let (looks, [single, bulk]) = log(&path)?;
-        let row =
-            [name.to_owned(), looks.to_string(), format!("{single:.0}"), format!("{bulk:.0}")];
-        logs.push(row.to_vec());
+        logs.push(log(&path)?.row(name));
     }
     let rows: Vec<Vec<String>> = costs.iter().map(|cost| row(cost, least)).collect();
     let reverts = Reverts::measure();
@@ -123,6 +157,15 @@ pub fn tables(page: &Path, data: Option<&Path>) -> Result<Vec<String>, Error> {
         [format!("fold {ALL} at once"), format!("{:.2}", reverts.fold)].to_vec(),
         [format!("take {} of them out", ALL / OUT_OF), format!("{:.3}", reverts.out)].to_vec(),
         ["put them back".to_owned(), format!("{:.3}", reverts.back)].to_vec(),
+    ];
+    let log_header = [
+        "log",
+        "contributions",
+        "one by one /s",
+        "all at once /s",
+        "tiles",
+        "bytes/tile, packed",
+        "MB/m2 after a year of such days",
     ];
     let header = [
         "segments",
@@ -139,7 +182,7 @@ pub fn tables(page: &Path, data: Option<&Path>) -> Result<Vec<String>, Error> {
         "ratio",
     ];
     let text = [
-        report::table(&["log", "contributions", "one by one /s", "all at once /s"], &logs),
+        report::table(&log_header, &logs),
         report::table(&header, &rows),
         report::table(&["act", "s"], &acts),
     ];

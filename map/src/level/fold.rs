@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use super::{Batch, Contribution, ContributionId, FeatureId, LevelMap, Misplaced};
 use crate::raster::{
-    Blocks, SensorClass, SliceConfig, SliceKey, Stack, Tile, TileKey, TilePatch, Touched,
+    Blocks, SensorClass, Slice, SliceConfig, SliceKey, Stack, Sums, Tile, TileKey, TilePatch,
+    Touched,
 };
 use crate::vector::{ChainId, Chains, Evidence, Things, VectorConfig, Walls, Work};
 
@@ -38,7 +39,8 @@ pub struct Changes {
     pub chains: BTreeSet<ChainId>,
     /// Tiles.
     pub tiles: BTreeSet<TileKey>,
-    /// The sums that tiles are read from; not published, see [`Level::sums`].
+    /// The sums that tiles are read from; not published, see [`Level::sums`]. Also those that are only held in another
+    /// way.
     pub slices: BTreeSet<SliceKey>,
 }
 
@@ -65,6 +67,10 @@ impl Evident {
     fn add(&mut self, at: SliceKey, blocks: Blocks) {
         self.slices.insert(at);
         self.tiles.entry(at.key).or_default().add(blocks);
+    }
+
+    fn held_anew(&mut self, key: TileKey, slices: Vec<Slice>) {
+        self.slices.extend(slices.into_iter().map(|slice| SliceKey { key, slice }));
     }
 }
 
@@ -103,17 +109,16 @@ impl Level {
     /// bits as folding them.
     pub fn restore<'a>(
         config: LevelConfig,
-        sums: impl IntoIterator<Item = (SliceKey, Tile)>,
+        sums: impl IntoIterator<Item = (SliceKey, Sums)>,
         contributions: impl IntoIterator<Item = &'a Contribution>,
     ) -> Self {
         let mut level = Self::new(config);
-        // Oldest first: what lies below the newest slice is then read once for each.
-        let sums: BTreeMap<SliceKey, Tile> = sums.into_iter().collect();
-        for (SliceKey { key, slice }, tile) in sums {
-            let stack = level.stacks.entry(key).or_default();
-            stack.change(slice, config.slices, |sums| *sums = tile);
+        let mut stacks: BTreeMap<TileKey, BTreeMap<Slice, Sums>> = BTreeMap::new();
+        for (SliceKey { key, slice }, sums) in sums {
+            stacks.entry(key).or_default().insert(slice, sums);
         }
-        level.stacks.retain(|_, stack| !stack.is_empty());
+        let stacks = stacks.into_iter();
+        level.stacks = stacks.map(|(key, sums)| (key, Stack::new(sums, config.slices))).collect();
         let readings = level.stacks.iter();
         level.map.tiles = readings
             .filter_map(|(key, stack)| Some((*key, stack.reading(config.slices)?)))
@@ -136,7 +141,7 @@ impl Level {
 
     /// The summed evidence of one layer's tile in one slice, if there is any: what must be kept, with
     /// the contributions, to [`Self::restore`] the level.
-    pub fn sums(&self, at: &SliceKey) -> Option<&Arc<Tile>> {
+    pub fn sums(&self, at: &SliceKey) -> Option<&Sums> {
         self.stacks.get(&at.key)?.sums(at.slice)
     }
 
@@ -209,8 +214,9 @@ impl Level {
         let mut evident = Evident::default();
         for (at, sums) in &batch.evidence {
             let stack = self.stacks.entry(at.key).or_default();
-            stack.change(at.slice, self.config.slices, |tile| change(tile, sums));
+            let held_anew = stack.change(at.slice, self.config.slices, |tile| change(tile, sums));
             evident.add(*at, Blocks::of_tile(sums));
+            evident.held_anew(at.key, held_anew);
         }
         self.read_again(&evident);
         evident
@@ -229,8 +235,10 @@ impl Level {
                 for (tile, cells) in &patch.tiles {
                     let key = TileKey { class: patch.class, tile: *tile };
                     let stack = self.stacks.entry(key).or_default();
-                    stack.change(slice, self.config.slices, |sums| change(sums, cells));
+                    let config = self.config.slices;
+                    let held_anew = stack.change(slice, config, |sums| change(sums, cells));
                     evident.add(SliceKey { key, slice }, Blocks::of_patch(cells));
+                    evident.held_anew(key, held_anew);
                 }
             }
         }

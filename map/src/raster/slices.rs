@@ -12,9 +12,10 @@
 //! without it. Limiting while adding, as grids do elsewhere, would depend on the order.
 
 use std::collections::BTreeMap;
+use std::mem;
 use std::sync::Arc;
 
-use super::{LogOdds, Tile, TileKey};
+use super::{LogOdds, Sums, Tile, TileKey};
 
 /// How evidence is put into slices and read from them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,65 +66,140 @@ pub struct SliceKey {
     pub slice: Slice,
 }
 
+/// How many slices of a tile are held open: the newest, to which nearly all looks are added, and the one before it, for
+/// robots that come back with yesterday's.
+const OPEN: usize = 2;
+
 /// The slices of one layer's tile.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Stack {
-    /// Sums; none without evidence.
-    slices: BTreeMap<Slice, Arc<Tile>>,
+    /// Sums; none without evidence. The newest [`OPEN`] are open, all before them packed.
+    slices: BTreeMap<Slice, Sums>,
+    /// What those before the open ones read as, if there are any.
+    below_open: Option<Arc<Tile>>,
     /// What all but the newest read as, if there are others.
     below_newest: Option<Arc<Tile>>,
 }
 
 impl Stack {
+    /// The slices that hold `sums`.
+    pub(crate) fn new(sums: BTreeMap<Slice, Sums>, config: SliceConfig) -> Self {
+        let mut stack = Self { slices: sums, ..Self::default() };
+        stack.hold(config);
+        stack
+    }
+
     /// The sums of one slice.
-    pub(crate) fn sums(&self, slice: Slice) -> Option<&Arc<Tile>> {
+    pub(crate) fn sums(&self, slice: Slice) -> Option<&Sums> {
         self.slices.get(&slice)
     }
 
-    /// Whether there is no evidence.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.slices.is_empty()
-    }
-
-    /// Changes the sums of one slice.
+    /// Changes the sums of one slice. Returns the slices whose sums are held in another way now.
     pub(crate) fn change(
         &mut self,
         slice: Slice,
         config: SliceConfig,
         change: impl FnOnce(&mut Tile),
-    ) {
-        let newest = self.slices.last_key_value().map(|(newest, _)| *newest);
-        if newest.is_some_and(|newest| newest < slice) {
-            self.below_newest = self.reading(config);
+    ) -> Vec<Slice> {
+        let [newest, second] = self.newest();
+        let sums = self.slices.remove(&slice);
+        let was_there = sums.is_some();
+        let mut tile = sums.map_or_else(Arc::default, Sums::into_tile);
+        change(Arc::make_mut(&mut tile));
+        let is_there = !tile.is_empty();
+        if is_there {
+            self.slices.insert(slice, Sums::Open(tile));
         }
-        let sums = self.slices.entry(slice).or_default();
-        change(Arc::make_mut(sums));
-        let is_empty = sums.is_empty();
-        if is_empty {
-            self.slices.remove(&slice);
+        if !was_there && !is_there {
+            return Vec::new();
         }
-        // As it mostly is: the newest slice grows, and what lies below it stays.
-        if is_empty || newest.is_some_and(|newest| newest > slice) {
-            self.below_newest = self.read_below_newest(config);
+        if was_there && is_there && newest == Some(slice) {
+            // As it mostly is: the newest slice grows, and what lies below it stays.
+            return Vec::new();
         }
+        if was_there && is_there && second == Some(slice) {
+            self.below_newest = self.on_top_of(self.below_open.as_ref(), slice, config);
+            return Vec::new();
+        }
+        if is_there && newest < Some(slice) {
+            // A slice begins.
+            self.below_open = mem::take(&mut self.below_newest);
+            if let Some(newest) = newest {
+                self.below_newest = self.on_top_of(self.below_open.as_ref(), newest, config);
+            }
+            return second.filter(|second| self.pack(*second)).into_iter().collect();
+        }
+        self.hold(config)
     }
 
     /// What the tile reads as; `None` without evidence.
     pub(crate) fn reading(&self, config: SliceConfig) -> Option<Arc<Tile>> {
-        let (_, newest) = self.slices.last_key_value()?;
-        let Some(below) = &self.below_newest else { return Some(Arc::clone(newest)) };
-        Some(Arc::new(config.on_top(below, newest)))
+        let (newest, _) = self.slices.last_key_value()?;
+        self.on_top_of(self.below_newest.as_ref(), *newest, config)
     }
 
-    fn read_below_newest(&self, config: SliceConfig) -> Option<Arc<Tile>> {
-        let mut earlier = self.slices.values().rev().skip(1).rev();
-        let first = Arc::clone(earlier.next()?);
-        Some(earlier.fold(first, |below, sums| Arc::new(config.on_top(&below, sums))))
+    /// `below`, with the sums of a slice on top.
+    fn on_top_of(
+        &self,
+        below: Option<&Arc<Tile>>,
+        slice: Slice,
+        config: SliceConfig,
+    ) -> Option<Arc<Tile>> {
+        let sums = self.slices.get(&slice)?.tile();
+        Some(below.map_or(Arc::clone(&sums), |below| Arc::new(config.on_top(below, &sums))))
+    }
+
+    /// The newest slices, newest first.
+    fn newest(&self) -> [Option<Slice>; OPEN] {
+        let mut newest = self.slices.keys().rev().copied();
+        std::array::from_fn(|_| newest.next())
+    }
+
+    /// Packs a slice; whether it was open.
+    fn pack(&mut self, slice: Slice) -> bool {
+        let Some(sums) = self.slices.get_mut(&slice).filter(|sums| matches!(sums, Sums::Open(_)))
+        else {
+            return false;
+        };
+        *sums = sums.clone().packed();
+        true
+    }
+
+    /// Holds every slice as it should be, and reads anew what lies below the open ones. Returns the
+    /// slices that were held in another way.
+    fn hold(&mut self, config: SliceConfig) -> Vec<Slice> {
+        let open = self.newest();
+        let mut held_anew = Vec::new();
+        let [newest, second] = open;
+        (self.below_open, self.below_newest) = (None, None);
+        let slices: Vec<Slice> = self.slices.keys().copied().collect();
+        for slice in slices {
+            let is_open = open.contains(&Some(slice));
+            if is_open {
+                let packed =
+                    self.slices.get_mut(&slice).filter(|sums| matches!(sums, Sums::Packed(_)));
+                if let Some(sums) = packed {
+                    *sums = sums.clone().open();
+                    held_anew.push(slice);
+                }
+            } else {
+                self.below_open = self.on_top_of(self.below_open.as_ref(), slice, config);
+                if self.pack(slice) {
+                    held_anew.push(slice);
+                }
+            }
+        }
+        if let Some(second) = second.filter(|_| newest.is_some()) {
+            self.below_newest = self.on_top_of(self.below_open.as_ref(), second, config);
+        }
+        held_anew
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use proptest::prelude::*;
 
     use super::super::{EvidenceRun, TilePatch};
@@ -140,11 +216,47 @@ mod tests {
     }
 
     fn add(stack: &mut Stack, slice: i64, value: i16) {
-        stack.change(Slice(slice), CONFIG, |sums| sums.add(&patch(value)));
+        change(stack, slice, |sums| sums.add(&patch(value)));
     }
 
     fn subtract(stack: &mut Stack, slice: i64, value: i16) {
-        stack.change(Slice(slice), CONFIG, |sums| sums.subtract(&patch(value)));
+        change(stack, slice, |sums| sums.subtract(&patch(value)));
+    }
+
+    /// Changes a slice, and sees that the stack is as one that is made of its sums, and that what it says is
+    /// held in another way is just that.
+    fn change(stack: &mut Stack, slice: i64, change: impl FnOnce(&mut Tile)) {
+        let was_open = open(stack);
+        let held_anew = stack.change(Slice(slice), CONFIG, change);
+        let is_open = open(stack);
+        let others = was_open.symmetric_difference(&is_open).filter(|other| other.0 != slice);
+        let others: BTreeSet<Slice> =
+            others.copied().filter(|other| stack.slices.contains_key(other)).collect();
+        assert!(
+            others.is_subset(&held_anew.iter().copied().collect()),
+            "{held_anew:?}, {others:?}"
+        );
+        let anew = Stack::new(stack.slices.clone(), CONFIG);
+        assert_eq!(is_open, open(&anew));
+        assert_eq!(stack.slices, anew.slices);
+        assert_eq!(stack.below_open, anew.below_open);
+        assert_eq!(stack.below_newest, anew.below_newest);
+    }
+
+    fn open(stack: &Stack) -> BTreeSet<Slice> {
+        let open = stack.slices.iter().filter(|(_, sums)| matches!(sums, Sums::Open(_)));
+        open.map(|(slice, _)| *slice).collect()
+    }
+
+    #[test]
+    fn only_the_newest_two_slices_are_held_open() {
+        let mut stack = Stack::default();
+        for day in 0..365 {
+            add(&mut stack, day, 85);
+        }
+        assert_eq!(open(&stack), [Slice(363), Slice(364)].into());
+        let bytes: usize = stack.slices.values().map(Sums::bytes).sum();
+        assert_eq!(bytes, 2 * 16_384 + 363 * 9, "a run, two steps of two bytes, a run");
     }
 
     #[test]
@@ -217,7 +329,7 @@ mod tests {
                     prop_assert_eq!(read(&stack), by_the_book(&left));
                 }
             }
-            prop_assert!(stack.slices.values().all(|sums| !sums.is_empty()));
+            prop_assert!(stack.slices.values().all(|sums| !sums.tile().is_empty()));
         }
     }
 }

@@ -90,7 +90,7 @@ proptest! {
         let looks = looks(seed, 40, NOISE);
         let mut before = Level::new(LevelConfig::standard(0.05));
         let slices = before.fold(&looks[..stored]).slices;
-        let sums = slices.iter().map(|at| (*at, before.sums(at).unwrap().as_ref().clone()));
+        let sums = slices.iter().map(|at| (*at, before.sums(at).unwrap().clone()));
         let bare: Vec<Contribution> = looks[..stored]
             .iter()
             .map(|c| Contribution { evidence: Vec::new(), ..c.clone() })

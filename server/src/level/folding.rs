@@ -6,7 +6,7 @@
 //! some reader may have seen it.
 
 use mapfold_map::level::{Batch, Changes, Level, LevelConfig, Misplaced};
-use mapfold_map::raster::{SliceKey, Tile};
+use mapfold_map::raster::{SliceKey, Sums};
 
 use super::history::{ChangeCounts, MapHistory};
 use super::recall::{Entry, Logged};
@@ -61,7 +61,7 @@ impl Folding {
     pub(super) fn restored(
         config: &LevelConfig,
         revision: i64,
-        sums: impl IntoIterator<Item = (SliceKey, Tile)>,
+        sums: impl IntoIterator<Item = (SliceKey, Sums)>,
         log: &[Logged],
         force: &Force,
     ) -> Self {

@@ -8,7 +8,7 @@ use std::ops::Bound;
 use std::sync::Arc;
 
 use mapfold_map::level::{Changes, ContributionId, FeatureId, Level};
-use mapfold_map::raster::{SensorClass, Slice, SliceKey, Tile, TileIndex, TileKey};
+use mapfold_map::raster::{SensorClass, Slice, SliceKey, Sums, Tile, TileIndex, TileKey};
 use mapfold_map::vector::{Chain, ChainId, Cluster, Segment};
 use rpds::{RedBlackTreeMapSync, RedBlackTreeSetSync};
 
@@ -80,6 +80,10 @@ impl<K: Least, V: PartialEq> History<K, V> {
         };
         if !same {
             self.put(key, revision, value);
+        } else if let Some(old) = self.things.get(&key) {
+            // As it is held now: what is packed need not be kept open here.
+            let revision = old.revision;
+            self.things.insert_mut(key, Dated { revision, value });
         }
         !same
     }
@@ -166,7 +170,7 @@ pub(crate) struct MapHistory {
     /// Tiles.
     pub(super) tiles: History<TileKey, Tile>,
     /// The sums that tiles are read from. Nobody is told of them; the store keeps them.
-    pub(super) slices: History<SliceKey, Tile>,
+    pub(super) slices: History<SliceKey, Sums>,
     /// Tiles of the prior: of the log's imports, not of the fold.
     pub(super) prior: PriorHistory,
     /// What confirmed walls say, told from the segments.
@@ -194,7 +198,7 @@ impl MapHistory {
             count
         }
         for at in &changes.slices {
-            self.slices.record(*at, revision, level.sums(at).cloned());
+            self.slices.record(*at, revision, level.sums(at).cloned().map(Arc::new));
         }
         let map = level.map();
         let resolution = level.config().resolution;
@@ -216,8 +220,10 @@ impl MapHistory {
         ) -> bool {
             changed.iter().all(|key| history.get(key).and_then(|(_, value)| value) == map.get(key))
         }
-        let sums_agree =
-            |at: &SliceKey| self.slices.get(at).and_then(|(_, sums)| sums) == level.sums(at);
+        let sums_agree = |at: &SliceKey| {
+            let noted = self.slices.get(at).and_then(|(_, sums)| sums);
+            noted.map(AsRef::as_ref) == level.sums(at)
+        };
         let map = level.map();
         changes.slices.iter().all(sums_agree)
             && all(&self.segments, &changes.segments, &map.segments)

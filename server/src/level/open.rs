@@ -6,7 +6,7 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 use mapfold_map::level::LevelConfig;
-use mapfold_map::raster::{SliceKey, Tile, TileKey};
+use mapfold_map::raster::{SliceKey, Sums, TileKey};
 use mapfold_schema::border::{parse_chain_id, parse_feature_id};
 
 use super::folding::Folding;
@@ -138,18 +138,20 @@ fn restored_with_history(
     force: &Force,
 ) -> Result<Folding, String> {
     let rows = &stored.rows;
-    let mut sums: Vec<(SliceKey, Tile)> = Vec::new();
+    let mut sums: Vec<(SliceKey, Sums)> = Vec::new();
     for row in &rows.slices {
         if let Some(content) = &row.content {
             let tile = tile_cells::decode(content).map_err(|e| format!("{:?}: {e}", row.at))?;
-            sums.push((row.at, tile));
+            // Nearly all of them are old: packed here, never are all open at once.
+            sums.push((row.at, Sums::Open(Arc::new(tile)).packed()));
         }
     }
     let mut folding = Folding::restored(config, stored.folded_revision, sums, log, force);
     let map = folding.level().map().clone();
     let mut history = MapHistory::default();
     for row in &rows.slices {
-        history.slices.put(row.at, row.revision, folding.level().sums(&row.at).cloned());
+        let sums = folding.level().sums(&row.at).cloned();
+        history.slices.put(row.at, row.revision, sums.map(Arc::new));
     }
     for row in &rows.tiles {
         let tile = map.tiles.get(&row.key);

@@ -18,7 +18,7 @@ pub(crate) fn changed(history: &MapHistory, since: i64, until: i64) -> Result<Ma
     let unfit = |table, detail: String| StoreError::Corrupt { table, key: "a row".into(), detail };
     let mut slices = Vec::new();
     for (revision, at, sums) in history.slices.changed(since, until) {
-        let content = sums.map(|sums| tile_cells::encode(sums)).transpose();
+        let content = sums.map(|sums| tile_cells::encode(&sums.tile())).transpose();
         let content = content.map_err(|e| unfit("slices", e.to_string()))?;
         slices.push(SliceRow { at, revision, content });
     }
