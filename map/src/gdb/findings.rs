@@ -85,7 +85,7 @@ pub enum FindingKind {
     },
     /// So many objects lie over each other that not all of them were held against each other.
     TooCrowded,
-    /// A doorway that meets no wall.
+    /// A doorway that meets no wall: it opens nothing.
     DoorwayOutsideWall,
     /// A doorway that opens one face of a wall but does not come out on another.
     DoorwayNotThrough,
@@ -99,6 +99,7 @@ impl FindingKind {
             | Self::OpenShell { .. }
             | Self::Overlap { .. }
             | Self::TooCrowded
+            | Self::DoorwayOutsideWall
             | Self::DoorwayNotThrough => Severity::Warning,
             _ => Severity::Error,
         }

@@ -1,8 +1,8 @@
 //! Every kind of finding, found where it is, and nowhere else.
 
 use mapfold_map::gdb::{
-    Face, Finding, FindingKind as K, Kind, Model, Object, Placement, Point3, Polygon, Polyhedron,
-    Prototype, Severity, Shape, Solid, Structure, findings,
+    Face, Finding, FindingKind as K, Kind, Model, Object, Outline, Placement, Plan, PlanPoint,
+    Point3, Polygon, Polyhedron, Prototype, Severity, Shape, Solid, Structure, findings,
 };
 
 use super::world::{block, cube, doorway, id, model, wall};
@@ -192,6 +192,22 @@ fn a_doorway_wants_a_wall_and_wants_to_go_through_it() {
         "it only touches"
     );
     assert_eq!(kinds(doorway([1.0, -0.1], [2.0, 0.2])), [(id(1), K::DoorwayNotThrough)]);
+}
+
+/// Leaves of sliding doors, say: they open nothing, so they keep nobody from publishing.
+#[test]
+fn a_doorway_in_no_wall_is_told_and_changes_no_plan() {
+    let wall = || wall([0.0, 0.0], [6.0, 0.4]);
+    let leaf = || doorway([1.0, 1.0], [2.0, 1.025]);
+    let findings = of([wall(), leaf()]);
+    assert_eq!(findings.iter().map(|f| f.kind.severity()).collect::<Vec<_>>(), [Severity::Warning]);
+    let [with, without] =
+        [model([wall(), leaf()]), model([wall()])].map(|model| Structure::of(&model).plan(0.5));
+    let corners = |plan: &Plan| -> Vec<PlanPoint> {
+        plan.outlines().iter().flat_map(Outline::vertices).collect()
+    };
+    assert_eq!(corners(&with), corners(&without));
+    assert_eq!((with.openings().len(), with.sheets().len()), (0, 0));
 }
 
 /// A draft shows what it has right.
