@@ -1,7 +1,7 @@
 // Takes a model's file into the draft of a level of a running server in Chromium, publishes it, shows its landmarks on the map
 // and the model in space, and says what the page showed, one JSON object a line:
 //
-//   PAGE_URL=http://127.0.0.1:7171 TOKEN=... SITE=... LEVEL=... FILES=a.building.yaml[,b] [BAD=file] [SHOTS=folder] node e2e/files.mjs
+//   PAGE_URL=http://127.0.0.1:7171 TOKEN=... SITE=... LEVEL=... FILES=a.building.yaml[,b] [BAD=file] [BUILDING_LEVEL=name] [UNIT=metres] [SHOTS=folder] node e2e/files.mjs
 //
 //   {"event": "refused", "text"}             what is said of a file that is none
 //   {"event": "told", "text", "doubts"}      what is in the file, before anything is taken
@@ -27,6 +27,8 @@ const url = setting("PAGE_URL").replace(/\/$/, "");
 const place = `site=${encodeURIComponent(setting("SITE"))}&level=${encodeURIComponent(setting("LEVEL"))}`;
 const files = setting("FILES").split(",");
 const bad = process.env["BAD"] ?? "";
+const buildingLevel = process.env["BUILDING_LEVEL"] ?? "";
+const unit = process.env["UNIT"] ?? "";
 const shots = process.env["SHOTS"] ?? "";
 
 /** @param {object} line */
@@ -64,6 +66,8 @@ try {
     say({ event: "refused", text: await page.locator(".files-card .problem").innerText() });
   }
   await page.setInputFiles("#model-files", files);
+  if (buildingLevel !== "") await page.fill("#model-file-level", buildingLevel);
+  if (unit !== "") await page.fill("#model-file-unit", unit);
   await page.click("#model-file-preview");
   await page.locator("#model-file-confirm").waitFor();
   const doubts = page.locator(".files-card .prior-warnings");

@@ -47,6 +47,12 @@ describe("surfaces", () => {
     expect(areaOf(triangles)).toBeCloseTo(4 + 4 * Math.SQRT2, 5);
     expect(edges.length / 6).toBe(8);
     expect(Math.min(...Array.from(triangles).filter((_, n) => n % 3 === 0))).toBe(10);
+    // A cube cut up into triangles, as files have it: its edges are those of the cube.
+    const at = [0, 1].flatMap((x) => [0, 1].flatMap((y) => [0, 1].map((z): [number, number, number] => [x, y, z])));
+    const sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
+    const halves = sides.flatMap(([a = 0, b = 0, c = 0, d = 0]) => [[[a, b, c]], [[a, c, d]]]);
+    const cube = surfaceOf({ polyhedron: { vertices_m: at, faces: halves } });
+    expect([areaOf(cube.triangles), cube.edges.length / 6]).toEqual([6, 12]);
     // An arrow head: of its two diagonals only one lies within.
     const arrow: GdbSolid = { polyhedron: { vertices_m: [[0, 0, 0], [2, 1, 0], [0, 2, 0], [1, 1, 0]], faces: [[[0, 1, 2, 3]]] } };
     expect(areaOf(surfaceOf(arrow).triangles)).toBeCloseTo(1, 6);

@@ -83,7 +83,7 @@ export function createFilesCard(parent: HTMLElement, actions: FileActions): (sta
     input,
     ...levelRow,
     ...unitRow,
-    el("label", { attrs: { for: replace.id } }, replace, " in the place of all that the draft has"),
+    el("label", { class: "whole", attrs: { for: replace.id } }, replace, " in the place of all that the draft has"),
     tryOut,
     told,
     doubts,
@@ -91,7 +91,7 @@ export function createFilesCard(parent: HTMLElement, actions: FileActions): (sta
   );
   const hint = el("p", {
     class: "hint",
-    text: "Open-RMF building.yaml, DXF, GLB, JSON-FG; or a map of map_server (YAML and image, or both in a zip), whose occupied cells become walls.",
+    text: "Open-RMF building.yaml, DXF, GLB, JSON-FG, GeoJSON; or a map of map_server (YAML and image, or both in a zip), whose occupied cells become walls.",
   });
   const barred = el("p", { class: "hint", text: "To take models in, sign in with a token that has the scope map:edit." });
   const busy = el("p", { class: "hint", attrs: { role: "status" } });

@@ -75,20 +75,39 @@ export function partAt(parts: readonly Part[], vertex: number): Part | null {
   return parts[low] ?? null;
 }
 
-/** The edges between the corners of faces, each once. */
-function edgesOf(faces: readonly (readonly (readonly number[])[])[]): [number, number][] {
-  const met = new Set<string>();
-  const edges: [number, number][] = [];
-  for (const ring of faces.flat()) {
-    for (const [n, from] of ring.entries()) {
-      const to = ring[(n + 1) % ring.length] ?? from;
-      const name = from < to ? `${from} ${to}` : `${to} ${from}`;
-      if (met.has(name)) continue;
-      met.add(name);
-      edges.push([from, to]);
+/** How much the normals of two faces may differ for them to be one plane: 0.6 degrees, as a cosine. */
+const ONE_PLANE = 0.99995;
+
+/** The edges between the corners of faces, each once; not those between two faces of one plane, which only cut it up. */
+function edgesOf(corners: readonly Triple[], faces: readonly (readonly (readonly number[])[])[]): [number, number][] {
+  const met = new Map<string, { ends: [number, number]; normals: Triple[] }>();
+  for (const rings of faces) {
+    const normal = areaNormalOf(rings[0]?.map((index) => corners[index] ?? [0, 0, 0]) ?? []);
+    for (const ring of rings) {
+      for (const [n, from] of ring.entries()) {
+        const to = ring[(n + 1) % ring.length] ?? from;
+        const name = from < to ? `${from} ${to}` : `${to} ${from}`;
+        const edge = met.get(name) ?? { ends: [from, to], normals: [] };
+        edge.normals.push(normal);
+        met.set(name, edge);
+      }
     }
   }
-  return edges;
+  const isSeen = ({ normals: [a, b, ...others] }: { normals: Triple[] }): boolean =>
+    a === undefined || b === undefined || others.length > 0 || a[0] * b[0] + a[1] * b[1] + a[2] * b[2] < ONE_PLANE * Math.hypot(...a) * Math.hypot(...b);
+  return [...met.values()].filter(isSeen).map(({ ends }) => ends);
+}
+
+/** A ring's normal, twice its area long (Newell). */
+function areaNormalOf(ring: readonly Triple[]): Triple {
+  const normal: Triple = [0, 0, 0];
+  for (const [n, p] of ring.entries()) {
+    const q = ring[(n + 1) % ring.length] ?? p;
+    normal[0] += (p[1] - q[1]) * (p[2] + q[2]);
+    normal[1] += (p[2] - q[2]) * (p[0] + q[0]);
+    normal[2] += (p[0] - q[0]) * (p[1] + q[1]);
+  }
+  return normal;
 }
 
 /** A wall as the boxes that its doorways leave of it, and what closes its corners. */
@@ -145,7 +164,7 @@ function hullOf(solid: GdbSolid): Hull {
     return drawnUp([ring], lower, upper);
   }
   const { vertices_m: corners, faces } = solid.polyhedron;
-  return { corners, faces, edges: edgesOf(faces) };
+  return { corners, faces, edges: edgesOf(corners, faces) };
 }
 
 function drawnUp(rings: readonly (readonly [number, number][])[], lower: number, upper: number): Hull {
@@ -187,15 +206,8 @@ function facesOf(corners: readonly Triple[], rings: readonly (readonly number[])
   if (outer.length < 3 || all.some((index) => corners[index] === undefined)) return [];
   if (all.length === 3) return all;
   if (all.length === 4 && holes.length === 0) return halves(corners, outer);
-  // Seen along the axis to which the face is most nearly square (Newell's normal).
-  const normal: Triple = [0, 0, 0];
-  for (const [n, index] of outer.entries()) {
-    const p: Triple = corners[index] ?? [0, 0, 0];
-    const q: Triple = corners[outer[(n + 1) % outer.length] ?? index] ?? [0, 0, 0];
-    normal[0] += (p[1] - q[1]) * (p[2] + q[2]);
-    normal[1] += (p[2] - q[2]) * (p[0] + q[0]);
-    normal[2] += (p[0] - q[0]) * (p[1] + q[1]);
-  }
+  // Seen along the axis to which the face is most nearly square.
+  const normal = areaNormalOf(outer.map((index) => corners[index] ?? [0, 0, 0]));
   const size = normal.map(Math.abs);
   const axis = size.indexOf(Math.max(...size));
   const flat = (ring: readonly number[]): Vector2[] =>
