@@ -6,6 +6,8 @@ import type { FileTold } from "./model_files";
 import type { Place } from "./permalink";
 import type { Evidence, PictureAddress } from "./pyramid";
 import type {
+  Alignment,
+  Alignments,
   ContributionPage,
   GdbAnswer,
   GdbCollection,
@@ -32,6 +34,7 @@ import type {
   RobotDescription,
   SessionDescription,
   SiteDescription,
+  UncertainPose,
   VectorPatch,
 } from "./wire";
 
@@ -116,6 +119,12 @@ export interface Api {
   changes: (place: Place, heightM: number) => Promise<ModelChanges>;
   /** What is to become of one of them. */
   answerChange: (place: Place, id: string, answer: ModelChangeAnswer, heightM: number) => Promise<ModelChangeAnswered>;
+  /** Frames of robots' own, with the places that they may have, and the alignments in the log. */
+  alignments: (place: Place) => Promise<Alignments>;
+  /** Accepts where a frame lies. */
+  align: (place: Place, frame: string, pose: UncertainPose) => Promise<Alignment>;
+  /** Takes a frame off the map again. */
+  withdrawAlignment: (place: Place, frame: string) => Promise<Alignment[]>;
   vector: (place: Place, since: number, signal: AbortSignal) => Promise<VectorPatch>;
   raster: (place: Place, since: number, signal: AbortSignal) => Promise<RasterChanges>;
   /** One picture of the raster; null where there is nothing to see. */
@@ -250,6 +259,9 @@ export function createApi(browser: Browser): Api {
     changes: (place, heightM) => askJson(`${levelPath(place)}/changes?height_m=${heightM}`),
     answerChange: (place, id, answer, heightM) =>
       askJson(`${levelPath(place)}/changes/${encodeURIComponent(id)}?height_m=${heightM}`, posted({ answer })),
+    alignments: (place) => askJson(`${levelPath(place)}/alignments`),
+    align: (place, frame, pose) => askJson(`${levelPath(place)}/alignments/${encodeURIComponent(frame)}`, posted({ pose })),
+    withdrawAlignment: (place, frame) => askJson(`${levelPath(place)}/alignments/${encodeURIComponent(frame)}`, { method: "DELETE" }),
     vector: (place, since, signal) => askJson(`${levelPath(place)}/vector?since=${since}`, { signal }),
     raster: (place, since, signal) => askJson(`${levelPath(place)}/raster?since=${since}`, { signal }),
     picture: async (place, picture, evidence) => {

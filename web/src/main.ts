@@ -1,6 +1,7 @@
 // Puts the page together: state, requests, map and panels. The only place that knows them all, and
 // the only one that reads the clock.
 
+import { createAlignmentActions } from "./aligning";
 import { createApi } from "./api";
 import { setShown } from "./dom";
 import { createChangeActions } from "./changing";
@@ -15,6 +16,7 @@ import { createImportActions } from "./importing";
 import { createMapView } from "./map/view";
 import { followModel, type ModelFollower } from "./modelling";
 import { DARK, LIGHT, type Theme } from "./palette";
+import { createAlignmentsCard } from "./panels/alignments_card";
 import { createChangesCard } from "./panels/changes_card";
 import { createContributionsCard } from "./panels/contributions_card";
 import { createEditBar } from "./panels/edit_bar";
@@ -101,6 +103,7 @@ const takenIn = createFileActions({
   },
 });
 const changes = createChangeActions({ api, state: store.state, dispatch, timers });
+const alignments = createAlignmentActions({ api, state: store.state, dispatch, timers });
 const memory = createWindowMemory({ shared: window.localStorage, own: window.sessionStorage, locks: locksOf((navigator as Partial<Navigator>).locks), newId: uuid });
 const edit = createEditActions({ api, state: store.state, dispatch, memory, timers, uuid });
 // What a closed window has left is found once it is known which ones live.
@@ -115,6 +118,7 @@ const draws = [
   createModelCard(panels, { store, actions: draft }),
   createFilesCard(panels, takenIn),
   createChangesCard(panels, { store, actions: changes }),
+  createAlignmentsCard(panels, { store, actions: alignments }),
   createPriorCard(panels, prior),
   createContributionsCard(panels, { store, theme, onOpenLog: log.open }),
   createLogPanel({ parent: page, store, theme, actions: log }),
@@ -179,6 +183,7 @@ store.onChange((state, before) => {
   }
   const isAnotherHeight = before.model.view.heightM !== state.model.view.heightM;
   if (isAnotherHeight || before.level?.revision !== state.level?.revision) changes.refresh();
+  if (before.level?.revision !== state.level?.revision) alignments.refresh();
   const { copy, clashes } = state.editing;
   if (copy !== null && (copy !== before.editing.copy || clashes !== before.editing.clashes)) edit.changed();
   if (state.imports.open && before.level !== state.level) prior.refresh();

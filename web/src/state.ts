@@ -6,6 +6,7 @@ import type { LayerName, Layers, LayerSetting } from "./layers";
 import { withSlots } from "./palette";
 import type { Permalink, Place, View } from "./permalink";
 import type { Evidence } from "./pyramid";
+import { NO_ALIGNMENTS, type AlignmentsState } from "./alignments";
 import { NO_CHANGES, type ChangesState } from "./changes";
 import { NO_DRAFT, type DraftState } from "./drafts";
 import { NO_EDITING, type EditingState } from "./editing";
@@ -70,6 +71,7 @@ export interface State {
   model: ModelState;
   draft: DraftState;
   changes: ChangesState;
+  alignments: AlignmentsState;
   editing: EditingState;
   link: Link;
   layers: Layers;
@@ -100,6 +102,7 @@ export type Event =
   | { kind: "files"; files: Partial<FilesState> }
   | { kind: "draft"; draft: Partial<DraftState> }
   | { kind: "changes"; changes: Partial<ChangesState> }
+  | { kind: "alignments"; alignments: Partial<AlignmentsState> }
   | { kind: "editing"; editing: Partial<EditingState> }
   | { kind: "model"; model: Partial<ModelState> }
   | { kind: "model-view"; view: Partial<ModelView> }
@@ -129,6 +132,7 @@ const NO_LEVEL = {
   files: NO_FILES,
   draft: NO_DRAFT,
   changes: NO_CHANGES,
+  alignments: NO_ALIGNMENTS,
   editing: NO_EDITING,
   link: { kind: "idle" },
   selection: null,
@@ -199,6 +203,8 @@ export function update(state: State, event: Event): State {
       return { ...state, draft: { ...state.draft, ...event.draft } };
     case "changes":
       return { ...state, changes: { ...state.changes, ...event.changes } };
+    case "alignments":
+      return { ...state, alignments: { ...state.alignments, ...event.alignments } };
     case "editing":
       return { ...state, editing: { ...state.editing, ...event.editing } };
     case "model":

@@ -98,6 +98,11 @@ export type ModelChange = Exactly<
 >;
 export type ModelChanges = Exactly<Wire["ModelChanges"], { changes: ModelChange[] }>;
 export type ModelChangeAnswered = Exactly<Wire["ModelChangeAnswered"], { change: ModelChange }>;
+export type Alignment = Exactly<Wire["Alignment"], { pose: UncertainPose }>;
+export type AlignmentCandidate = Exactly<Wire["AlignmentCandidate"], { pose: UncertainPose }>;
+export type AlignmentDoubt = Wire["AlignmentDoubt"];
+export type UnalignedFrame = Exactly<Wire["UnalignedFrame"], { candidates: AlignmentCandidate[] }>;
+export type Alignments = Exactly<Wire["Alignments"], { unaligned: UnalignedFrame[]; alignments: Alignment[] }>;
 export type LandmarkKind = Wire["LandmarkKind"];
 export type Landmark = Exactly<Wire["Landmark"], { at_m: [number, number]; covariance: Matrix3 }>;
 export type LandmarkTable = Exactly<Wire["LandmarkTable"], { landmarks: Landmark[] }>;
