@@ -43,8 +43,8 @@ pub(super) async fn read(request: Request, limit_bytes: usize) -> Result<Bytes, 
         }
         let mut cause: Option<&(dyn Error + 'static)> = Some(&rejection);
         while let Some(error) = cause {
-            if error.is::<TooLong>() {
-                return ApiError::BodyTooLarge { limit_bytes };
+            if let Some(TooLong { limit_bytes }) = error.downcast_ref() {
+                return ApiError::BodyTooLong { limit_bytes: *limit_bytes };
             }
             if error.is::<TimeoutError>() {
                 return ApiError::BodyTimeout;

@@ -16,7 +16,7 @@ use hyper::body::{Frame, SizeHint};
 #[derive(Debug, thiserror::Error)]
 #[error("the body is longer than {limit_bytes} bytes")]
 pub(super) struct TooLong {
-    limit_bytes: usize,
+    pub(super) limit_bytes: usize,
 }
 
 /// How much is read on for, in caps.

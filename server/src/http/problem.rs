@@ -50,6 +50,8 @@ pub(super) enum ApiError {
     BodyTimeout,
     /// The body is too large.
     BodyTooLarge { limit_bytes: usize },
+    /// A body of more bytes than may come over the wire, packed or not.
+    BodyTooLong { limit_bytes: usize },
     /// Too many items in one body.
     TooManyItems { limit: usize },
     /// The body broke off or cannot be unpacked.
@@ -193,15 +195,15 @@ impl ApiError {
                 of(406, "not_acceptable", format!("What can be had here is {offered}."))
             }
             Self::BodyTimeout => of(408, "body_timeout", "The body did not arrive in time."),
-            Self::BodyTooLarge { limit_bytes } => of(
-                413,
-                "body_too_large",
-                format!(
-                    "A body may have {limit_bytes} bytes here once unpacked; send less at once, or have the server take more: \
-                    `upload_bytes` and `upload_compressed_bytes` under `[http]` of its configuration (`body_bytes` for all that \
-                    is no upload)."
-                ),
-            ),
+            Self::BodyTooLarge { limit_bytes } => body_too_large(format!(
+                "A body may have {limit_bytes} bytes here once unpacked; send less at once, or have the server take more: \
+                `upload_bytes` and `upload_compressed_bytes` under `[http]` of its configuration (`body_bytes` for all that \
+                is no upload)."
+            )),
+            Self::BodyTooLong { limit_bytes } => body_too_large(format!(
+                "A body may have {limit_bytes} bytes on its way here: pack it (`Content-Encoding: gzip` or `zstd`), send less at \
+                once, or have the server take more: `upload_compressed_bytes` under `[http]` of its configuration."
+            )),
             Self::TooManyItems { limit } => {
                 of(413, "too_many_items", format!("One body may hold {limit} of these."))
             }
@@ -449,6 +451,10 @@ impl IntoResponse for ApiError {
     }
 }
 
+fn body_too_large(detail: String) -> Problem {
+    of(413, "body_too_large", detail)
+}
+
 /// An answer that bears a problem.
 pub(super) fn respond(problem: Problem) -> Response {
     let status = StatusCode::from_u16(problem.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
@@ -463,7 +469,7 @@ pub(super) fn of_status(status: StatusCode, limit_bytes: usize) -> Problem {
         StatusCode::NOT_FOUND => ApiError::NoRoute.problem(),
         StatusCode::METHOD_NOT_ALLOWED => ApiError::WrongMethod.problem(),
         StatusCode::REQUEST_TIMEOUT => ApiError::BodyTimeout.problem(),
-        StatusCode::PAYLOAD_TOO_LARGE => ApiError::BodyTooLarge { limit_bytes }.problem(),
+        StatusCode::PAYLOAD_TOO_LARGE => ApiError::BodyTooLong { limit_bytes }.problem(),
         StatusCode::UNSUPPORTED_MEDIA_TYPE => {
             of(415, "unsupported_coding", "A body may be coded as gzip or zstd, once.")
         }
