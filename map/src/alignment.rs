@@ -72,6 +72,8 @@ pub struct AlignmentConfig {
     pub spread: f64,
     /// Length of wall that errs together, metres.
     pub correlation: f64,
+    /// Deviation that no length of wall takes out, metres: maps are of cells, and the poses they are made of err together.
+    pub common: f64,
 }
 
 impl AlignmentConfig {
@@ -86,7 +88,7 @@ impl AlignmentConfig {
             },
             ..LearnedConfig::STANDARD
         },
-        wall_min: 0.5,
+        wall_min: 0.25,
         structure_reach: 4.0,
         structures_max: 1500,
         structure_range: 8.0,
@@ -106,6 +108,7 @@ impl AlignmentConfig {
         sd_max: (0.15, 0.015),
         spread: 0.05,
         correlation: 5.0,
+        common: 0.01,
     };
 }
 

@@ -12,7 +12,12 @@ pub(crate) fn killian() -> PathBuf {
 
 /// Further logs with corrected poses, as far as they are in `logs/` of `data`, by their names in tables.
 pub(crate) fn further(data: Option<&Path>) -> Vec<(String, PathBuf)> {
+    named(data, &FURTHER)
+}
+
+/// Logs as far as they are in `logs/` of `data`, by their names in tables.
+pub(crate) fn named(data: Option<&Path>, names: &[&str]) -> Vec<(String, PathBuf)> {
     let path = |name| data.map(|data| data.join(format!("logs/{name}.log.gz")));
-    let there = FURTHER.into_iter().filter_map(|name| Some((format!("{name} *"), path(name)?)));
+    let there = names.iter().filter_map(|name| Some((format!("{name} *"), path(name)?)));
     there.filter(|(_, path)| path.is_file()).collect()
 }

@@ -101,8 +101,8 @@ fn shared_landmarks(
     own.landmarks.iter().filter(is_shared).count()
 }
 
-/// Covariance of the pose, from the walls that agree: each says where it is across itself. It is worked out
-/// about the middle of them, and moved to the origin of the robot's frame.
+/// Covariance of the pose, from the walls that agree: each says where it is across itself, and all of them err by what
+/// they have in common. It is worked out about the middle of them, and moved to the origin of the robot's frame.
 fn covariance(
     level: &Chart,
     own: &Chart,
@@ -113,8 +113,9 @@ fn covariance(
     let information = information(level, own, pose, middle, config);
     let inverse = information.cholesky().map(|c| c.inverse());
     let diagonal = [UNTOLD.0, UNTOLD.0, UNTOLD.1].map(|sd| sd * sd);
+    let common = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 0.0)) * config.common.powi(2);
     let about_middle = inverse
-        .and_then(|inverse| Covariance::new((inverse + inverse.transpose()) * 0.5).ok())
+        .and_then(|inverse| Covariance::new((inverse + inverse.transpose()) * 0.5 + common).ok())
         .unwrap_or_else(|| Covariance::from_variances(diagonal));
     let arm = pose.position() - middle;
     // The origin moves with the middle, and turns about it.
