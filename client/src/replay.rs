@@ -285,14 +285,20 @@ async fn mirror(options: &ReplayOptions, api: &Api) -> Result<Option<Mirror>, Re
     Ok(Some(mirror))
 }
 
+/// What a robot goes by that has this mirror: the map, the published model and the landmark table; `None` if its level has
+/// no raster, neither from robots nor as a prior.
+pub fn known_level(mirror: &Mirror, config: &LocalizerConfig) -> Option<KnownLevel> {
+    let landmarks = mirror.landmarks().copied();
+    let resolution_m = mirror.resolution_m()?;
+    KnownLevel::of_map_and_model(mirror.map(), mirror.surfaces(), landmarks, resolution_m, config)
+}
+
 /// What a robot is localized by that has this mirror.
 async fn whereabouts(mirror: Mirror, level: &LevelAddress) -> Result<Whereabouts, ReplayError> {
     let level = level.clone();
     worker(move || {
         let config = LocalizerConfig::STANDARD;
-        let resolution_m = mirror.resolution_m().unwrap_or_default();
-        let known = KnownLevel::of_map(mirror.map(), resolution_m, &config)
-            .ok_or(ReplayError::NothingKnown { level })?;
+        let known = known_level(&mirror, &config).ok_or(ReplayError::NothingKnown { level })?;
         Ok(Whereabouts::new(known, mirror.revision(), config))
     })
     .await?

@@ -40,7 +40,9 @@ pub use footprint::{Footprint, footprints};
 pub use landmark::{LandmarkConfig, LandmarkId, PlannedLandmark, landmarks};
 pub use model::{Kind, Model, Object, ObjectId, Prototype, PrototypeName, Shape};
 pub use placement::{Placement, Point3};
-pub use plan::{Edge, Free, Opening, OpeningSide, Outline, Owner, Plan, Sheet, TooCrowded};
+pub use plan::{
+    Edge, Free, Opening, OpeningSide, Outline, Owner, Plan, Sheet, Surface, TooCrowded,
+};
 pub use polygon::Polygon;
 pub use prior::{Prior, PriorConfig, PriorError, prior};
 pub use solid::{Cylinder, Face, Polyhedron, Solid};

@@ -63,10 +63,16 @@ pub struct PlacesConfig {
     pub occupied: f64,
     /// Down to this evidence a cell is not yet free, nat.
     pub free: f64,
+    /// Down to this a cell that the prior says is free, and no robot contradicts, is presumed to be, nat.
+    pub presumed: f64,
+    /// Of what the prior says is solid, so much can be seen from outside, metres.
+    pub skin: f64,
     /// What a beam that ends in the unknown costs, nat.
     pub unknown_cost: f64,
     /// What one that ends in free space costs, nat.
     pub free_cost: f64,
+    /// What one that ends in what is presumed to be free costs: furniture is in no plan, nat.
+    pub presumed_cost: f64,
     /// What one costs that passes through a wall, nat. Little: glass, and walls grazed.
     pub through_cost: f64,
     /// Deviation of beams' ends from the cells of the walls that they hit, metres.
@@ -103,8 +109,11 @@ impl PlacesConfig {
         cell: 0.1,
         occupied: 0.62,
         free: -1.0,
+        presumed: -0.4,
+        skin: 0.05,
         unknown_cost: 1.0,
         free_cost: 3.0,
+        presumed_cost: 1.5,
         through_cost: 0.3,
         spread: 0.08,
         temper: 0.5,

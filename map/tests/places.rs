@@ -2,9 +2,13 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use mapfold_map::geometry::{Level, Point, Pose, Robot, difference};
-use mapfold_map::places::{Beam, LikelihoodField, PlacesConfig, View, search, search_near};
+use mapfold_map::level::LevelMap;
+use mapfold_map::places::{
+    Beam, LikelihoodField, PlacesConfig, View, place_near, search, search_near,
+};
 use mapfold_map::raster::{Cell, TILE_CELLS, Tile, TileIndex};
 
 const RESOLUTION: f64 = 0.05;
@@ -44,13 +48,34 @@ fn field(floor: &Floor) -> LikelihoodField {
             }
         }
     }
-    let walls = floor.iter().flat_map(|[left, bottom, right, top]| {
-        let corners = [(*left, *bottom), (*right, *bottom), (*right, *top), (*left, *top)];
-        let corners = corners.map(|(x, y)| Point::new(x, y));
-        (0..4).map(move |i| (corners[i], corners[(i + 1) % 4]))
-    });
+    let walls = floor.iter().flat_map(sides);
     let tiles = tiles.into_iter().map(|(index, cells)| (index, Tile::new(cells)));
     LikelihoodField::new(tiles, walls, RESOLUTION, &PlacesConfig::STANDARD)
+}
+
+/// The sides of a rectangle, each with its inside on the left.
+fn sides([left, bottom, right, top]: &[f64; 4]) -> impl Iterator<Item = (Point, Point)> + use<> {
+    let corners = [(*left, *bottom), (*right, *bottom), (*right, *top), (*left, *top)];
+    let corners = corners.map(|(x, y)| Point::new(x, y));
+    (0..4).map(move |i| (corners[i], corners[(i + 1) % 4]))
+}
+
+/// A map that nobody has driven on, with the prior of a plan: rooms -0.5 nat, all else within 2 m of one solid.
+fn planned(floor: &Floor) -> LevelMap {
+    let mut tiles: BTreeMap<TileIndex, Box<[i32; TILE_CELLS]>> = BTreeMap::new();
+    let cells = |v: f64| (v / RESOLUTION).round() as i32;
+    for [left, bottom, right, top] in floor {
+        for column in cells(*left - 2.0)..cells(*right + 2.0) {
+            for row in cells(*bottom - 2.0)..cells(*top + 2.0) {
+                let cell = Cell { column, row };
+                let (tile, offset) = cell.tile();
+                let value = if is_free(floor, &cell.centre(RESOLUTION)) { -50 } else { 200 };
+                tiles.entry(tile).or_insert_with(|| Box::new([0; TILE_CELLS]))[offset] = value;
+            }
+        }
+    }
+    let tile = |(index, cells)| (index, Arc::new(Tile::new(cells)));
+    LevelMap { prior: tiles.into_iter().map(tile).collect(), ..LevelMap::default() }
 }
 
 /// What a robot sees all around, by stepping along its beams.
@@ -94,6 +119,37 @@ fn a_room_unlike_any_other_is_found_from_anywhere_in_it() {
         assert!(found.rest < best.fit - 6.9, "{truth:?}: {found:?}");
         assert!(best.hits > 0.95 && best.throughs < 0.05, "{best:?}");
     }
+}
+
+#[test]
+fn a_plan_alone_tells_a_robot_its_place() {
+    let floor = angled(3.0);
+    let walls = floor.iter().flat_map(sides);
+    let config = PlacesConfig::STANDARD;
+    let field = LikelihoodField::of_map_and_walls(&planned(&floor), walls, RESOLUTION, &config);
+    for (x, y, heading) in [(4.0, 1.0, 0.3), (4.2, 5.1, -2.0), (9.0, 2.2, 3.1), (7.4, 0.6, 1.6)] {
+        let truth = Pose::new(x, y, heading);
+        // A cupboard that is in no plan takes up a sixth of what is seen.
+        let mut view = view(&floor, &truth);
+        let hidden = view.beams.len() / 6;
+        view.beams[..hidden].iter_mut().for_each(|beam| beam.to *= 0.6);
+        let found = search(&field, &view, &[]);
+        let best = found.places.first().unwrap();
+        assert!(is_at(&best.level_from_robot.pose, &truth), "{truth:?}: {best:?}");
+        assert!(found.rest < best.fit - 6.9, "{truth:?}: {found:?}");
+        assert!(found.places.len() == 1 && best.hits > 0.75, "{found:?}");
+    }
+    // Nobody has been there: that is presumed to be free, not found to be.
+    assert!(!field.is_free(&Point::new(4.0, 1.0)));
+    // What would end deep inside of something solid fits no wall.
+    let at = Pose::new(4.0, 1.0, 0.0);
+    let hits = |y: f64| {
+        let to = Point::new(0.0, y - at.y);
+        let beams = vec![Beam { from: Point::zeros(), to, normal: None }; 40];
+        place_near(&field, &View { beams, walls: Vec::new() }, &at).hits
+    };
+    assert!(hits(-0.05) > 0.9);
+    assert!(hits(-1.2) < 0.1);
 }
 
 #[test]

@@ -5,10 +5,11 @@
 
 use std::collections::BTreeMap;
 
-use mapfold_map::gdb::{Model, Shape, Structure, findings};
+use mapfold_map::gdb::{LandmarkConfig, Model, Shape, Structure, Surface, findings, landmarks};
 use mapfold_schema::border::gdb::{
-    Library, check_edit, check_gdb, check_library, coord_ref_sys, map_object, map_prototype,
-    object_id, wire_feature, wire_finding, wire_plan, wire_prototype,
+    Library, check_edit, check_gdb, check_library, coord_ref_sys, map_landmark, map_object,
+    map_prototype, map_surfaces, object_id, wire_feature, wire_finding, wire_gdb_landmark,
+    wire_plan, wire_prototype,
 };
 use mapfold_schema::codec;
 use mapfold_schema::v1::{
@@ -143,6 +144,40 @@ fn a_plan_tells_whose_each_edge_is_and_where_doorways_open() {
     let told: Vec<_> = findings(&model).iter().map(wire_finding).collect();
     let open = told.iter().find(|finding| finding.code == "open_shell").unwrap();
     assert_eq!((open.object, open.solid), (Some(Uuid::from_u128(6)), Some(1)));
+}
+
+#[test]
+fn robots_get_the_surfaces_and_landmarks_of_a_plan_as_they_are() {
+    let (_, library) = shelves();
+    let objects = check_gdb(&read(&everything()), FRAME, &library).unwrap();
+    let mapped = objects.iter().map(|(id, o)| (object_id(*id), map_object(o).unwrap())).collect();
+    let plan = Structure::of(&Model { prototypes: library, objects: mapped }).plan(0.3);
+    let wire = wire_plan(&plan, 3, 1);
+    let told = codec::from_cbor(&codec::to_cbor(&wire).unwrap()).unwrap();
+    let surfaces: Vec<Surface> = plan.edges().map(Surface::from).collect();
+    assert_eq!(map_surfaces(&told).unwrap(), surfaces);
+    assert!(surfaces.len() > 20);
+    let planned = landmarks(&plan, &LandmarkConfig::STANDARD);
+    assert!(planned.len() > 10);
+    for planned in planned {
+        let read = map_landmark(&wire_gdb_landmark(&planned)).unwrap();
+        let own = planned.landmark;
+        assert_eq!((read.kind, read.at, read.direction), (own.kind, own.at, own.direction));
+        assert_eq!(read.covariance, own.covariance);
+        assert!((read.direction_sd - own.direction_sd).abs() < 1e-12);
+    }
+
+    // What cannot be is told with its place.
+    let pointer = |plan: &_| map_surfaces(plan).unwrap_err()[0].pointer.clone();
+    let mut wrong = wire.clone();
+    wrong.outlines[1][2].object = 99;
+    assert_eq!(pointer(&wrong), "/outlines/1/2/object");
+    let mut wrong = wire.clone();
+    wrong.outlines[0][1].at_m[1] = f64::NAN;
+    assert_eq!(pointer(&wrong), "/outlines/0/1/at_m");
+    let mut wrong = wire;
+    wrong.objects[0].tolerance_m = -0.1;
+    assert_eq!(pointer(&wrong), "/objects/0/tolerance_m");
 }
 
 #[test]

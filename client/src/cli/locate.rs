@@ -10,7 +10,7 @@ use mapfold_client::localization::{
 };
 use mapfold_client::log::{Log, Observation, Reading, carmen};
 use mapfold_client::perception::Perception;
-use mapfold_client::replay::{Competence, SensorChoice};
+use mapfold_client::replay::{Competence, SensorChoice, known_level};
 use mapfold_client::sensor::{Scan, Sensors};
 use mapfold_client::sync::{Mirror, MirrorConfig};
 use mapfold_map::geometry::{Level, Odom, Pose, Robot, UncertainPose};
@@ -77,9 +77,7 @@ impl Locate {
         if let Some(error) = mirror.refresh_if_reachable(&self.place.api()?).await? {
             say(&format!("{error}; going by the mirror at revision {}", mirror.revision()));
         }
-        let resolution_m = mirror.resolution_m().ok_or("the mirror is empty")?;
-        KnownLevel::of_map(mirror.map(), resolution_m, config)
-            .ok_or_else(|| format!("{level} {NOTHING_KNOWN}").into())
+        known_level(&mirror, config).ok_or_else(|| format!("{level} {NOTHING_KNOWN}").into())
     }
 
     /// The fix of each scan by itself.

@@ -1,7 +1,8 @@
 //! The whole of localization: seek until the place is certain, track until it is not, and seek again.
 
+use mapfold_map::gdb::Surface;
 use mapfold_map::geometry::{Level, Pose, Robot, UncertainPose, difference, mahalanobis_sq};
-use mapfold_map::landmarks::{LandmarkTable, LearnedConfig, landmarks_of_map};
+use mapfold_map::landmarks::{Landmark, LandmarkTable, LearnedConfig, landmarks_of_map};
 use mapfold_map::level::LevelMap;
 use mapfold_map::places::{LikelihoodField, PlacesConfig, View, place_near, search_near};
 use mapfold_map::vector::ObservedSegment;
@@ -28,11 +29,28 @@ pub struct KnownLevel {
 impl KnownLevel {
     /// What a map tells, `resolution` metres a cell; `None` if it has no raster, neither from robots nor as a prior.
     pub fn of_map(map: &LevelMap, resolution: f64, config: &LocalizerConfig) -> Option<Self> {
-        (!map.tiles.is_empty() || !map.prior.is_empty()).then(|| Self {
-            field: LikelihoodField::of_map(map, resolution, &config.places),
-            walls: ReferenceWalls::of_map(map),
-            table: Some(learned_table(map)),
-        })
+        Self::of_map_and_model(map, &[], [], resolution, config)
+    }
+
+    /// What a map tells and, where it does not, the surfaces of the a-priori model; `landmarks` are those of both, as the
+    /// server's table has them. Without any, those that the map's walls make.
+    pub fn of_map_and_model(
+        map: &LevelMap,
+        surfaces: &[Surface],
+        landmarks: impl IntoIterator<Item = Landmark>,
+        resolution: f64,
+        config: &LocalizerConfig,
+    ) -> Option<Self> {
+        if map.tiles.is_empty() && map.prior.is_empty() {
+            return None;
+        }
+        let sides = surfaces.iter().flat_map(Surface::sides);
+        let field = LikelihoodField::of_map_and_walls(map, sides, resolution, &config.places);
+        let mut walls = ReferenceWalls::of_map(map);
+        walls.fill_up(surfaces, |p| field.is_free(p));
+        let told: Vec<Landmark> = landmarks.into_iter().collect();
+        let table = if told.is_empty() { learned_table(map) } else { LandmarkTable::new(told) };
+        Some(Self { field, walls, table: Some(table) })
     }
 }
 

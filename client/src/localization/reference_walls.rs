@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use mapfold_map::gdb::{Free, ObjectId, Plan};
-use mapfold_map::geometry::{Covariance, Point, tangent, unit_normal, wrap};
+use mapfold_map::gdb::{ObjectId, Plan, Surface};
+use mapfold_map::geometry::{
+    Covariance, Interval, Point, subtract_intervals, tangent, union_intervals, unit_normal, wrap,
+};
 use mapfold_map::level::{FeatureId, LevelMap};
 use mapfold_map::vector::{Facing, Segment};
 use nalgebra::{Matrix2, Matrix2x3};
@@ -23,6 +25,13 @@ pub struct ReferenceWallsConfig {
     pub angle_sd_min: f64,
     /// Objects of the model are at least this large when it is asked how far they may be turned, metres.
     pub object_min: f64,
+    /// A surface of the model and a wall of the map that are no farther apart, and face the same way to within this
+    /// cosine, are one, metres.
+    pub apart: f64,
+    /// See `apart`.
+    pub same_cosine: f64,
+    /// Surfaces are looked at in steps of this where robots may have seen through them, metres.
+    pub step: f64,
 }
 
 impl ReferenceWallsConfig {
@@ -33,6 +42,9 @@ impl ReferenceWallsConfig {
         offset_sd_min: 0.005,
         angle_sd_min: 0.2 * std::f64::consts::PI / 180.0,
         object_min: 0.5,
+        apart: 0.15,
+        same_cosine: 0.94,
+        step: 0.1,
     };
 }
 
@@ -108,55 +120,65 @@ impl ReferenceWalls {
         walls
     }
 
-    /// Those of a plan of the a-priori model. Where an object stands is one error of all its walls.
+    /// Those of a plan of the a-priori model.
     pub fn of_plan(plan: &Plan) -> Self {
+        let surfaces: Vec<Surface> = plan.edges().map(Surface::from).collect();
         let mut walls = Self::default();
-        let config = ReferenceWallsConfig::STANDARD;
-        let mut extents: BTreeMap<ObjectId, (Point, Point)> = BTreeMap::new();
-        for edge in plan.edges() {
-            let (a, b) = (edge.from.metres(), edge.to.metres());
-            let extent = extents.entry(edge.owner.id).or_insert((a, a));
-            *extent = (extent.0.inf(&a).inf(&b), extent.1.sup(&a).sup(&b));
-        }
-        for edge in plan.edges() {
-            let (a, b) = (edge.from.metres(), edge.to.metres());
-            let Some((low, high)) = extents.get(&edge.owner.id) else { continue };
-            if (b - a).norm() < config.length_min {
-                continue;
-            }
-            let sides = [(a, b), (b, a)];
-            let sides = if edge.free == Free::Both { &sides[..] } else { &sides[..1] };
-            for (from, to) in sides {
-                // Either side of a sheet by where it begins.
-                let start = if *from == a { edge.from } else { edge.to };
-                let name = WallName::Planned(edge.owner.id, start);
-                let mut wall = face(name, from, to);
-                // Both ends stand that far off, each for itself.
-                let (sd, size) = (edge.owner.tolerance, (high - low).norm().max(config.object_min));
-                let turn = std::f64::consts::SQRT_2 * sd / size;
-                let arm = wall.middle - (low + high) * 0.5;
-                let lever = wall.normal.y * arm.x - wall.normal.x * arm.y;
-                let of_object = Matrix2x3::new(
-                    wall.normal.x * sd,
-                    wall.normal.y * sd,
-                    lever * turn, //
-                    0.0,
-                    0.0,
-                    turn,
-                );
-                wall.errors = vec![
-                    (MapError::Object(edge.owner.id), of_object),
-                    (MapError::Wall(name), own(&Covariance::zero(), &config)),
-                ];
-                walls.add(wall);
-            }
-        }
+        planned(&surfaces, &ReferenceWallsConfig::STANDARD).for_each(|wall| walls.add(wall));
         walls
     }
 
-    /// Adds those of another set.
-    pub fn extend(&mut self, other: Self) {
-        other.walls.into_iter().for_each(|wall| self.add(wall));
+    /// Adds what the a-priori model tells besides: its surfaces where no wall of the map is, which robots have measured,
+    /// and where they did not see through it (`is_free`: whether a place is known to be free).
+    pub fn fill_up(&mut self, surfaces: &[Surface], is_free: impl Fn(&Point) -> bool) {
+        let config = ReferenceWallsConfig::STANDARD;
+        let all: Vec<ReferenceWall> = planned(surfaces, &config).collect();
+        let left = all.into_iter().filter_map(|wall| self.untold(wall, &is_free, &config));
+        let left: Vec<ReferenceWall> = left.collect();
+        for wall in left {
+            self.add(wall);
+        }
+    }
+
+    /// What of a planned wall the others do not tell, and nobody has seen through.
+    fn untold(
+        &self,
+        wall: ReferenceWall,
+        is_free: impl Fn(&Point) -> bool,
+        config: &ReferenceWallsConfig,
+    ) -> Option<ReferenceWall> {
+        let whole: Vec<Interval> =
+            wall.parts.iter().map(|(from, to)| Interval::from_metres(*from, *to)).collect();
+        let at = |t: f64| wall.middle + wall.tangent * t;
+        let (first, last) = (wall.parts.first()?.0, wall.parts.last()?.1);
+        let mut told = Vec::new();
+        for other in self.near(&at(first), &at(last), config.apart) {
+            if wall.normal.dot(&other.normal) < config.same_cosine {
+                continue;
+            }
+            for (from, to) in &other.parts {
+                let ends = [*from, *to].map(|t| other.middle + other.tangent * t);
+                if ends.iter().all(|end| wall.across(end).abs() < config.apart) {
+                    told.push(Interval::from_metres(wall.along(&ends[0]), wall.along(&ends[1])));
+                }
+            }
+        }
+        let steps = ((last - first) / config.step).ceil().max(1.0);
+        for step in 0..steps as u32 {
+            let [from, to] =
+                [step, step + 1].map(|i| first + (last - first) * f64::from(i) / steps);
+            let middle = at(f64::midpoint(from, to));
+            let mut across = [-1.0, -0.5, 0.0, 0.5, 1.0].into_iter();
+            if across.all(|share| is_free(&(middle + wall.normal * (share * config.apart)))) {
+                told.push(Interval::from_metres(from, to));
+            }
+        }
+        let told = union_intervals(&told, 0);
+        let left = subtract_intervals(&whole, &told).into_iter();
+        let left = left.map(|part| (part.from_m(), part.to_m()));
+        let parts: Vec<(f64, f64)> =
+            left.filter(|(from, to)| to - from >= config.length_min).collect();
+        (!parts.is_empty()).then_some(ReferenceWall { parts, ..wall })
     }
 
     /// How many there are; what is seen from two sides counts twice.
@@ -223,6 +245,49 @@ fn face(name: WallName, from: &Point, to: &Point) -> ReferenceWall {
         parts: vec![(-0.5 * length, 0.5 * length)],
         errors: Vec::new(),
     }
+}
+
+/// The faces of surfaces of the model. Where an object stands is one error of all of them.
+fn planned<'a>(
+    surfaces: &'a [Surface],
+    config: &'a ReferenceWallsConfig,
+) -> impl Iterator<Item = ReferenceWall> + 'a {
+    let mut extents: BTreeMap<ObjectId, (Point, Point)> = BTreeMap::new();
+    for surface in surfaces {
+        let (a, b) = (surface.from.metres(), surface.to.metres());
+        let extent = extents.entry(surface.owner.id).or_insert((a, a));
+        *extent = (extent.0.inf(&a).inf(&b), extent.1.sup(&a).sup(&b));
+    }
+    let is_long = |surface: &&Surface| surface.from.distance(surface.to) >= config.length_min;
+    surfaces.iter().filter(is_long).flat_map(move |surface| {
+        let owner = &surface.owner;
+        let start = surface.from.metres();
+        let (low, high) = extents.get(&owner.id).copied().unwrap_or((start, start));
+        surface.sides().map(move |(from, to)| {
+            // Either side of a sheet by where it begins.
+            let begin = if from == start { surface.from } else { surface.to };
+            let name = WallName::Planned(owner.id, begin);
+            let mut wall = face(name, &from, &to);
+            // Both ends stand that far off, each for itself.
+            let (sd, size) = (owner.tolerance, (high - low).norm().max(config.object_min));
+            let turn = std::f64::consts::SQRT_2 * sd / size;
+            let arm = wall.middle - (low + high) * 0.5;
+            let lever = wall.normal.y * arm.x - wall.normal.x * arm.y;
+            let of_object = Matrix2x3::new(
+                wall.normal.x * sd,
+                wall.normal.y * sd,
+                lever * turn, //
+                0.0,
+                0.0,
+                turn,
+            );
+            wall.errors = vec![
+                (MapError::Object(owner.id), of_object),
+                (MapError::Wall(name), own(&Covariance::zero(), config)),
+            ];
+            wall
+        })
+    })
 }
 
 /// A square root of a covariance of (offset, angle), which is at least what no wall is better than.

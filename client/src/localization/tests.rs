@@ -359,3 +359,37 @@ fn the_walls_of_a_plan_stand_as_far_off_as_their_objects_may() {
     assert!((0.0204..0.0212).contains(&sd), "{sd}");
     assert!(tracked(&tracker).covariance.sd(1) > 0.19);
 }
+
+#[test]
+fn the_model_tells_what_the_map_does_not_and_nobody_has_seen_through() {
+    use mapfold_map::gdb::{Kind, Model, Object, ObjectId, Solid, Structure, Surface};
+    let mut model = Model::default();
+    let object = Object::of(Kind::Wall, vec![Solid::cuboid([0.0, 2.0, 0.0], [10.0, 2.3, 2.0])]);
+    model.objects.insert(ObjectId([1; 16]), object);
+    let plan = Structure::of(&model).plan(0.3);
+    let surfaces: Vec<Surface> = plan.edges().map(Surface::from).collect();
+    // Robots have measured the lower face from 3 to 6 m, 4 cm off, and seen through the wall from 7 to 8 m.
+    let mapped = Wall::new((6.0, 1.96), (3.0, 1.96)).mapped((0.0, 0.0), [1e-6; 2], [0.0; 2]);
+    let mut walls = ReferenceWalls::of_segments([(id(1), &mapped)]);
+    walls.fill_up(&surfaces, |p| (7.0..8.0).contains(&p.x) && p.y < 2.2);
+    let covers = |x: f64, y: f64| {
+        let at = Point::new(x, y);
+        let here = walls.near(&at, &at, 0.0).into_iter().filter(|wall| {
+            let along = wall.along(&at);
+            wall.across(&at).abs() < 0.01
+                && wall.parts.iter().any(|(from, to)| (*from..=*to).contains(&along))
+        });
+        here.map(|wall| matches!(wall.name, WallName::Planned(..))).collect::<Vec<_>>()
+    };
+    for x in [0.5, 2.8, 6.3, 6.8, 8.3, 9.5] {
+        assert_eq!(covers(x, 2.0), [true], "{x}");
+    }
+    for x in [3.2, 5.0, 5.8, 7.2, 7.8] {
+        assert!(covers(x, 2.0).is_empty(), "{x}");
+    }
+    assert_eq!(covers(4.0, 1.96), [false]);
+    // The other face is another one, and was not seen through all the way.
+    for x in [0.5, 4.0, 7.5] {
+        assert_eq!(covers(x, 2.3), [true], "{x}");
+    }
+}

@@ -259,6 +259,27 @@ impl Api {
         self.get(&format!("{path}?since={since}&limit={limit}")).await
     }
 
+    /// Landmarks that changed after revision `since`, at the height that the server takes for a sensor's.
+    ///
+    /// # Errors
+    /// See [`ApiError`]; 410 `cursor_expired` if the server does not know any more what was told at `since`; 409
+    /// `plan_too_crowded` if the published model cannot be cut.
+    pub async fn landmarks(
+        &self,
+        level: &LevelAddress,
+        since: i64,
+    ) -> Result<v1::LandmarkTable, ApiError> {
+        self.get(&format!("{}?since={since}", of_level(route::LANDMARKS, level)?)).await
+    }
+
+    /// The plan of the published model at the same height.
+    ///
+    /// # Errors
+    /// See [`ApiError`]; 409 `plan_too_crowded`.
+    pub async fn published_plan(&self, level: &LevelAddress) -> Result<v1::GdbPlan, ApiError> {
+        self.get(&format!("{}?state=published", of_level(route::GDB_PLAN, level)?)).await
+    }
+
     /// Segments, clusters and chains that changed after revision `since`.
     ///
     /// # Errors

@@ -5,14 +5,20 @@
 //! made anew, is noticed by its revision, its frame or its counts; the mirror then begins again
 //! from nothing and says so. (What is not noticed: a server that was set back and has since reached
 //! the same revision with as many segments, clusters, chains and tiles.)
+//!
+//! Beside the map it holds what robots find themselves by: the level's landmark table and the surfaces of the published
+//! model.
 
 mod file;
+mod landmarks;
 
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use mapfold_map::gdb::Surface;
+use mapfold_map::landmarks::Landmark;
 use mapfold_map::level::{LevelMap, apply};
 use mapfold_schema::border::{Violation, map_patch};
 use mapfold_schema::codec::EncodeError;
@@ -25,6 +31,7 @@ use tokio::time::{Instant, sleep};
 use uuid::Uuid;
 
 use file::{Saved, Unusable};
+use landmarks::KnownLandmarks;
 
 use super::durable::{self, DiskError};
 use super::{Api, ApiError, Backoff, BackoffConfig, LevelAddress};
@@ -110,6 +117,17 @@ pub enum MirrorError {
         /// What is wrong with it.
         violations: Vec<Violation>,
     },
+    /// The landmarks or the plan of the model hold what cannot be.
+    #[error(
+        "the landmarks of revision {revision} cannot be taken: {}",
+        .violations.first().map_or_else(String::new, |v| format!("{} at {:?}", v.detail, v.pointer))
+    )]
+    BadLandmarks {
+        /// Their revision.
+        revision: i64,
+        /// What is wrong with them.
+        violations: Vec<Violation>,
+    },
     /// The pages do not lead from revision to revision.
     #[error("asked for what follows revision {asked}, the server answers {since} to {revision}")]
     BadPage {
@@ -151,6 +169,7 @@ pub struct Mirror {
     /// Absent before the first refresh.
     ground: Option<Ground>,
     known: KnownMap,
+    landmarks: KnownLandmarks,
     /// Why the next refresh is to begin from nothing.
     resync: Option<ResyncReason>,
     /// Whether the disk holds less than this.
@@ -208,6 +227,7 @@ impl Mirror {
             config,
             ground: None,
             known: KnownMap::default(),
+            landmarks: KnownLandmarks::default(),
             resync: None,
             is_ahead_of_disk: false,
             counts_are_checked: true,
@@ -225,6 +245,7 @@ impl Mirror {
             Ok(Some(saved)) => {
                 mirror.ground = Some(saved.ground);
                 mirror.known = saved.known;
+                mirror.landmarks = saved.landmarks;
             }
             Err(Unusable::Disk(error)) => return Err(error.into()),
             Err(Unusable::Damaged(what)) => {
@@ -254,6 +275,16 @@ impl Mirror {
     /// The map.
     pub fn map(&self) -> &LevelMap {
         &self.known.map
+    }
+
+    /// The level's landmarks as the server tells them, those of the published model and those that robots taught.
+    pub fn landmarks(&self) -> impl Iterator<Item = &Landmark> {
+        self.landmarks.landmarks()
+    }
+
+    /// The surfaces of the published model at the height at which its landmarks are told.
+    pub fn surfaces(&self) -> &[Surface] {
+        self.landmarks.surfaces()
     }
 
     /// Brings it up to date, and onto disk if anything changed.
@@ -363,6 +394,7 @@ impl Mirror {
             self.begin_again(api, &level, reason, &mut changes).await?;
             self.counts_are_checked = !self.known.contradicts(&level);
         }
+        self.take_landmarks(api).await?;
         Ok(Refreshed { from_revision, to_revision: self.known.revision, changes, resync })
     }
 
@@ -396,6 +428,7 @@ impl Mirror {
         let mut known = KnownMap::default();
         while take_page(api, &self.level, self.config.page_limit, &mut known, changes).await? {}
         self.known = known;
+        self.landmarks = KnownLandmarks::default();
         self.ground = Some(ground_of(level));
         self.resync = None;
         self.is_ahead_of_disk = true;
@@ -414,11 +447,51 @@ impl Mirror {
         }
     }
 
+    /// Brings landmarks and model up to date, if the map is ahead of them.
+    async fn take_landmarks(&mut self, api: &Api) -> Result<(), MirrorError> {
+        if self.landmarks.is_asked(self.known.revision) {
+            return Ok(());
+        }
+        let told = match api.landmarks(&self.level, self.landmarks.since()).await {
+            // What changed since is not known any more.
+            Err(error) if error.is_refusal("cursor_expired") => {
+                self.landmarks = KnownLandmarks::default();
+                api.landmarks(&self.level, 0).await
+            }
+            told => told,
+        };
+        let table = match told {
+            Err(error) if error.is_refusal("plan_too_crowded") => {
+                tracing::warn!(level = %self.level, %error, "going by the map alone");
+                self.landmarks = KnownLandmarks::untold(self.known.revision);
+                self.is_ahead_of_disk = true;
+                return Ok(());
+            }
+            told => told?,
+        };
+        let is_published = table.publication > 0;
+        let plan = if is_published && self.landmarks.needs_plan(table.publication) {
+            Some(api.published_plan(&self.level).await?)
+        } else {
+            None
+        };
+        let revision = table.revision;
+        let bad = |violations| MirrorError::BadLandmarks { revision, violations };
+        self.landmarks = self.landmarks.with(table, plan).map_err(bad)?;
+        self.is_ahead_of_disk = true;
+        Ok(())
+    }
+
     /// Writes it to disk, if that holds less.
     async fn save(&mut self) -> Result<(), MirrorError> {
         let Some(ground) = self.ground.filter(|_| self.is_ahead_of_disk) else { return Ok(()) };
         // The copy shares all that it holds with the original.
-        let saved = Saved { level: self.level.clone(), ground, known: self.known.clone() };
+        let saved = Saved {
+            level: self.level.clone(),
+            ground,
+            known: self.known.clone(),
+            landmarks: self.landmarks.clone(),
+        };
         let folder = self.folder.clone();
         match spawn_blocking(move || file::write(&folder, &saved)).await {
             Ok(written) => written?,

@@ -4,6 +4,7 @@ use super::arrangement::PlanWork;
 use super::contours::Bordering;
 use super::exact::PlanPoint;
 use super::{Kind, ObjectId};
+use crate::geometry::Point;
 
 /// An object as far as a plan needs it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +39,34 @@ pub struct Edge<'a> {
     pub free: Free,
     /// Whose surface it is; a doorway's, for the jambs that it leaves in a wall.
     pub owner: &'a Owner,
+}
+
+/// A straight stretch of surface with what it belongs to: an [`Edge`] by itself.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surface {
+    /// Where it begins.
+    pub from: PlanPoint,
+    /// Where it ends.
+    pub to: PlanPoint,
+    /// Which sides of it are free.
+    pub free: Free,
+    /// Whose surface it is.
+    pub owner: Owner,
+}
+
+impl Surface {
+    /// Its sides, each from end to end with free space on the left, metres.
+    pub fn sides(&self) -> impl Iterator<Item = (Point, Point)> {
+        let (a, b) = (self.from.metres(), self.to.metres());
+        let back = (self.free == Free::Both).then_some((b, a));
+        std::iter::once((a, b)).chain(back)
+    }
+}
+
+impl From<Edge<'_>> for Surface {
+    fn from(edge: Edge<'_>) -> Self {
+        Self { from: edge.from, to: edge.to, free: edge.free, owner: *edge.owner }
+    }
 }
 
 /// A closed outline, with free space on its left: clockwise about something that stands in a room, counter-clockwise

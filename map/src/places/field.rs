@@ -6,7 +6,7 @@ use super::pyramid::Pyramid;
 use crate::geometry::Point;
 use crate::level::LevelMap;
 use crate::raster::{
-    Layered, LogOdds, SensorClass, TILE_CELLS, TILE_SIDE, Tile, TileIndex, TileKey,
+    Layered, LogOdds, Said, SensorClass, TILE_CELLS, TILE_SIDE, Tile, TileIndex, TileKey, together,
 };
 use crate::vector::Facing;
 
@@ -19,8 +19,14 @@ const CELLS_MAX: usize = 32_000_000;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Known {
     Nothing,
+    /// Free as far as the prior tells, which knows of no furniture: a robot may stand there, but what ends there need not be
+    /// a mistake.
+    Presumed,
     Free,
     Occupied,
+    /// Occupied as far as the prior tells. Deep inside of something solid that is nothing a beam could end on; see
+    /// [`LikelihoodField::bury`], after which there are none.
+    Built,
 }
 
 /// A level's raster as a search reads it.
@@ -62,23 +68,32 @@ pub(super) struct SearchField {
 impl LikelihoodField {
     /// Of a map: what its layers come to together, and its walls. `resolution` is the edge of its cells.
     pub fn of_map(map: &LevelMap, resolution: f64, config: &PlacesConfig) -> Self {
+        Self::of_map_and_walls(map, [], resolution, config)
+    }
+
+    /// Of a map and of walls that are known besides, each with free space on the left: those of the model, say, whose
+    /// raster is the map's prior.
+    pub fn of_map_and_walls(
+        map: &LevelMap,
+        walls: impl IntoIterator<Item = (Point, Point)>,
+        resolution: f64,
+        config: &PlacesConfig,
+    ) -> Self {
         let mut places: Vec<TileIndex> = map.tiles.keys().map(|key| key.tile).collect();
         places.extend(map.prior.keys());
         places.sort_unstable();
         places.dedup();
         let layer = |class, tile| map.tiles.get(&TileKey { class, tile }).map(AsRef::as_ref);
-        let together = |tile: TileIndex| {
-            Layered {
-                prior: map.prior.get(&tile).map(AsRef::as_ref),
-                scanner: layer(SensorClass::Scanner, tile),
-                sonar: layer(SensorClass::Sonar, tile),
-                walls: None,
-            }
-            .together()
+        let layered = |tile: TileIndex| Layered {
+            prior: map.prior.get(&tile).map(AsRef::as_ref),
+            scanner: layer(SensorClass::Scanner, tile),
+            sonar: layer(SensorClass::Sonar, tile),
+            walls: None,
         };
-        let tiles = places.into_iter().filter_map(|tile| Some((tile, together(tile)?)));
-        let walls = walls_of(map);
-        Self::new(tiles, walls, resolution, config)
+        let known = |tile| layered(tile).said(0..TILE_CELLS).map(|said| of_said(said, config));
+        let tiles = places.into_iter().map(|tile| (tile, known(tile).collect()));
+        let walls = walls_of(map).chain(walls);
+        Self::of_known(&tiles.collect::<Vec<_>>(), walls, resolution, config)
     }
 
     /// Of tiles with what is known of their cells, and of walls with free space on the left.
@@ -88,7 +103,20 @@ impl LikelihoodField {
         resolution: f64,
         config: &PlacesConfig,
     ) -> Self {
-        let tiles: Vec<(TileIndex, Tile)> = tiles.into_iter().collect();
+        let known = |tile: &Tile| {
+            tile.cells().iter().map(|cell| of_evidence(LogOdds(*cell), config)).collect()
+        };
+        let tiles = tiles.into_iter().map(|(index, tile)| (index, known(&tile)));
+        Self::of_known(&tiles.collect::<Vec<_>>(), walls, resolution, config)
+    }
+
+    /// Of tiles of cells.
+    fn of_known(
+        tiles: &[(TileIndex, Vec<Known>)],
+        walls: impl IntoIterator<Item = (Point, Point)>,
+        resolution: f64,
+        config: &PlacesConfig,
+    ) -> Self {
         let directions = Directions::new(walls);
         let span = |of: fn(&TileIndex) -> i32| {
             let low = tiles.iter().map(|t| of(&t.0)).min().unwrap_or(0);
@@ -99,19 +127,18 @@ impl LikelihoodField {
         let low = TileIndex { x, y };
         let mut slots = vec![0; columns * rows];
         let mut known = Vec::with_capacity(tiles.len() * TILE_CELLS);
-        for (number, (index, tile)) in (1..).zip(&tiles) {
+        for (number, (index, tile)) in (1..).zip(tiles) {
             slots[(index.y - y) as usize * columns + (index.x - x) as usize] = number;
-            known.extend(tile.cells().iter().map(|cell| of_evidence(LogOdds(*cell), config)));
+            known.extend_from_slice(tile);
         }
         let best = (STEPS * config.free_cost.max(config.unknown_cost)).round() as u8;
-        let fits = known.iter().map(|known| fit(*known, best, config)).collect();
         let mut field = Self {
             config: *config,
             resolution,
             low,
             columns,
             slots,
-            fits,
+            fits: Vec::new(),
             known,
             best,
             search: SearchField {
@@ -124,9 +151,45 @@ impl LikelihoodField {
                 directions,
             },
         };
+        field.bury();
+        field.fits = field.known.iter().map(|known| fit(*known, best, config)).collect();
         field.soften();
         field.search_field((columns, rows));
         field
+    }
+
+    /// What the prior says is solid is occupied where a beam can reach it, and nothing farther inside.
+    fn bury(&mut self) {
+        let reach = (self.config.skin / self.resolution).round() as i64;
+        let is_solid = |x, y| {
+            let known = self.index(x, y).map(|at| self.known[at]);
+            matches!(known, Some(Known::Built | Known::Occupied))
+        };
+        let mut found = Vec::new();
+        for (at, x, y) in self.places(Known::Built) {
+            let mut around =
+                (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy)));
+            let is_deep = around.all(|(dx, dy)| is_solid(x + dx, y + dy));
+            found.push((at, if is_deep { Known::Nothing } else { Known::Occupied }));
+        }
+        for (at, known) in found {
+            self.known[at] = known;
+        }
+    }
+
+    /// Where what is known of a cell is just that: where it is kept, its column and its row from the lower left tile.
+    fn places(&self, known: Known) -> impl Iterator<Item = (usize, i64, i64)> + use<'_> {
+        let side = TILE_SIDE as i64;
+        let kept = self.slots.iter().enumerate();
+        let kept = kept.filter_map(|(tile, slot)| Some((tile, slot.checked_sub(1)? as usize)));
+        kept.flat_map(move |(tile, slot)| {
+            let corner = ((tile % self.columns) as i64 * side, (tile / self.columns) as i64 * side);
+            let cells = slot * TILE_CELLS..(slot + 1) * TILE_CELLS;
+            cells.filter(move |at| self.known[*at] == known).map(move |at| {
+                let offset = (at % TILE_CELLS) as i64;
+                (at, corner.0 + offset % side, corner.1 + offset / side)
+            })
+        })
     }
 
     /// Cells near occupied ones fit by their distance.
@@ -140,25 +203,11 @@ impl LikelihoodField {
                 (dx, dy, (f64::from(self.best) - cost).max(0.0).round() as u8)
             })
             .collect();
-        let side = TILE_SIDE as i64;
-        let rows = self.slots.len() / self.columns.max(1);
-        for tile in 0..self.slots.len() {
-            let Some(slot) = self.slots[tile].checked_sub(1) else { continue };
-            let corner = ((tile % self.columns) as i64 * side, (tile / self.columns) as i64 * side);
-            for offset in 0..TILE_CELLS {
-                if self.known[slot as usize * TILE_CELLS + offset] != Known::Occupied {
-                    continue;
-                }
-                let x = corner.0 + (offset % TILE_SIDE) as i64;
-                let y = corner.1 + (offset / TILE_SIDE) as i64;
-                for (dx, dy, fit) in &kernel {
-                    let (x, y) = (x + dx, y + dy);
-                    if x < 0 || y < 0 || y >= rows as i64 * side {
-                        continue;
-                    }
-                    if let Some(at) = self.index(x, y) {
-                        self.fits[at] = self.fits[at].max(*fit);
-                    }
+        let occupied: Vec<_> = self.places(Known::Occupied).collect();
+        for (_, x, y) in occupied {
+            for (dx, dy, fit) in &kernel {
+                if let Some(at) = self.index(x + dx, y + dy) {
+                    self.fits[at] = self.fits[at].max(*fit);
                 }
             }
         }
@@ -203,6 +252,11 @@ impl LikelihoodField {
         self.index_of(p).map_or_else(unknown, |at| self.fits[at])
     }
 
+    /// Whether robots found that a place is free.
+    pub fn is_free(&self, p: &Point) -> bool {
+        self.known(p) == Known::Free
+    }
+
     /// What is known of a place.
     pub(crate) fn known(&self, p: &Point) -> Known {
         self.index_of(p).map_or(Known::Nothing, |at| self.known[at])
@@ -215,7 +269,7 @@ impl LikelihoodField {
             factor *= 2;
         }
         let (width, height) = (wide.div_ceil(factor), high.div_ceil(factor));
-        let mut counts = vec![(0_u32, 0_u32); width * height];
+        let mut counts = vec![(0_u32, 0_u32, 0_u32); width * height];
         for (tile, slot) in self.slots.iter().enumerate() {
             let Some(slot) = slot.checked_sub(1) else { continue };
             let (x, y) = (tile % columns * TILE_SIDE, tile / columns * TILE_SIDE);
@@ -225,11 +279,14 @@ impl LikelihoodField {
                 let count = &mut counts[y / factor * width + x / factor];
                 count.0 += u32::from(*known == Known::Occupied);
                 count.1 += u32::from(*known == Known::Free);
+                count.2 += u32::from(*known == Known::Presumed);
             }
         }
-        let of_cell = |(occupied, free): &(u32, u32)| match (occupied, free) {
+        let most = |of: u32| 2 * of as usize >= factor * factor;
+        let of_cell = |(occupied, free, presumed): &(u32, u32, u32)| match (occupied, free) {
             (1.., _) => Known::Occupied,
-            (0, free) if 2 * *free as usize >= factor * factor => Known::Free,
+            (0, free) if most(*free) => Known::Free,
+            (0, free) if most(free + presumed) => Known::Presumed,
             _ => Known::Nothing,
         };
         let known: Vec<Known> = counts.iter().map(of_cell).collect();
@@ -242,7 +299,8 @@ impl LikelihoodField {
                     .fill(self.best);
             }
         }
-        let free: Vec<u8> = known.iter().map(|known| u8::from(*known == Known::Free)).collect();
+        let is_free = |known: &Known| matches!(known, Known::Free | Known::Presumed);
+        let free: Vec<u8> = known.iter().map(|known| u8::from(is_free(known))).collect();
         let search = &mut self.search;
         search.cell = self.resolution * factor as f64;
         search.size = (width, height);
@@ -292,10 +350,22 @@ fn of_evidence(evidence: LogOdds, config: &PlacesConfig) -> Known {
     }
 }
 
+/// What the layers say of a cell. What the prior alone says is free is presumed to be; no robot has been there.
+fn of_said(said: Said, config: &PlacesConfig) -> Known {
+    let evidence = together(said).unwrap_or_default();
+    let is_untouched = said.scanner.0 == 0 && said.sonar.0 == 0;
+    match of_evidence(evidence, config) {
+        Known::Occupied if is_untouched => Known::Built,
+        Known::Nothing if evidence.nat() <= config.presumed && said.prior.0 < 0 => Known::Presumed,
+        known => known,
+    }
+}
+
 fn fit(known: Known, best: u8, config: &PlacesConfig) -> u8 {
     let cost = match known {
-        Known::Occupied => 0.0,
+        Known::Occupied | Known::Built => 0.0,
         Known::Nothing => config.unknown_cost,
+        Known::Presumed => config.presumed_cost,
         Known::Free => config.free_cost,
     };
     (f64::from(best) - STEPS * cost).max(0.0).round() as u8

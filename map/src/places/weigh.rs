@@ -108,9 +108,9 @@ fn passes_through(field: &LikelihoodField, from: &Point, to: &Point) -> bool {
     for step in 0..steps {
         let along = (OFF_SENSOR + f64::from(step) * STRIDE) / length;
         match field.known(&(from + way * along)) {
-            Known::Occupied => is_inside = true,
-            Known::Free if is_inside => return true,
-            Known::Free | Known::Nothing => {}
+            Known::Occupied | Known::Built => is_inside = true,
+            Known::Free | Known::Presumed if is_inside => return true,
+            Known::Free | Known::Presumed | Known::Nothing => {}
         }
     }
     false

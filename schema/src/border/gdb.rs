@@ -5,6 +5,7 @@
 
 mod document;
 mod findings;
+mod known;
 mod place;
 mod plan;
 mod solids;
@@ -16,6 +17,7 @@ use uuid::Uuid;
 
 pub use document::{CheckedDocument, check_document};
 pub use findings::{finding_code, wire_finding};
+pub use known::{map_landmark, map_surfaces};
 pub use plan::{landmark_id, learned_id, wire_gdb_landmark, wire_learned_landmark, wire_plan};
 pub use solids::vertex_count;
 

@@ -8,6 +8,8 @@
 //!                     nothing, zstd
 //! ```
 //!
+//! The payload may hold landmarks and the plan of the model besides; files of earlier programs do not.
+//!
 //! A file of version 1 knows no chains, one of version 2 no existence, one of version 3 no prior: of
 //! these only the level and its frame are taken over, and the map is fetched anew.
 
@@ -24,6 +26,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use uuid::Uuid;
 
+use super::landmarks::{KnownLandmarks, Told};
 use super::{Ground, KnownMap, MirrorError};
 use crate::sync::LevelAddress;
 use crate::sync::durable::{self, DiskError, at};
@@ -39,6 +42,7 @@ pub(super) struct Saved {
     pub(super) level: LevelAddress,
     pub(super) ground: Ground,
     pub(super) known: KnownMap,
+    pub(super) landmarks: KnownLandmarks,
 }
 
 /// The payload; all but the map is the same in every version.
@@ -49,15 +53,19 @@ struct Content<M> {
     frame: Uuid,
     resolution_m: f64,
     map: M,
+    #[serde(default)]
+    landmarks: Option<Told>,
 }
 
 impl<M> Content<M> {
-    fn saved(self, known: KnownMap) -> Saved {
-        Saved {
+    fn saved(self, known: KnownMap) -> Result<Saved, String> {
+        let landmarks = KnownLandmarks::of_told(self.landmarks.unwrap_or_default());
+        Ok(Saved {
             level: LevelAddress { site: self.site, level: self.level },
             ground: Ground { frame: self.frame, resolution_m: self.resolution_m },
             known,
-        }
+            landmarks: landmarks.map_err(|violations| format!("{violations:?}"))?,
+        })
     }
 }
 
@@ -96,7 +104,7 @@ fn path(folder: &Path) -> PathBuf {
 }
 
 fn encode(saved: &Saved) -> Result<io::Result<Vec<u8>>, codec::EncodeError> {
-    let Saved { level, ground, known } = saved;
+    let Saved { level, ground, known, landmarks } = saved;
     let patch = diff(&LevelMap::default(), &known.map);
     let content = Content {
         site: level.site.clone(),
@@ -104,6 +112,7 @@ fn encode(saved: &Saved) -> Result<io::Result<Vec<u8>>, codec::EncodeError> {
         frame: ground.frame,
         resolution_m: ground.resolution_m,
         map: wire_patch(&patch, 0, known.revision, false),
+        landmarks: Some(landmarks.told().clone()),
     };
     let cbor = codec::to_cbor(&content)?;
     Ok(zstd::bulk::compress(&cbor, ZSTD_LEVEL).map(|payload| {
@@ -129,11 +138,11 @@ fn decode(bytes: &[u8]) -> Result<Saved, String> {
     let cbor = zstd::stream::decode_all(payload).map_err(|e| e.to_string())?;
     if version < VERSION {
         let content: Content<IgnoredAny> = codec::from_cbor(&cbor).map_err(|e| e.to_string())?;
-        return Ok(content.saved(KnownMap::default()));
+        return content.saved(KnownMap::default());
     }
     let content: Content<v1::Patch> = codec::from_cbor(&cbor).map_err(|e| e.to_string())?;
     let patch = map_patch(&content.map).map_err(|violations| format!("{violations:?}"))?;
     let mut known = KnownMap { revision: content.map.revision, ..KnownMap::default() };
     apply(&patch, &mut known.map);
-    Ok(content.saved(known))
+    content.saved(known)
 }

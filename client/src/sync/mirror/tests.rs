@@ -264,10 +264,123 @@ fn the_prior_is_on_disk_with_the_rest() {
     cells[71..90].fill(-25);
     known.map.prior.insert(TileIndex { x: -3, y: 8 }, Arc::new(Tile::new(cells)));
     let ground = Ground { frame: FRAME, resolution_m: 0.05 };
-    let saved = Saved { level: level(), ground, known: known.clone() };
+    let landmarks = KnownLandmarks::default();
+    let saved = Saved { level: level(), ground, known: known.clone(), landmarks };
     file::write(folder.path(), &saved).unwrap();
     let mirror = open(&folder);
     assert_eq!((mirror.map(), mirror.revision()), (&known.map, 7));
+}
+
+/// A corner at (x, 2) m.
+fn corner(x: f64) -> v1::Landmark {
+    v1::Landmark {
+        id: format!("convex:{x}"),
+        kind: v1::LandmarkKind::ConvexCorner,
+        source: v1::LandmarkSource::Gdb,
+        at_m: [x, 2.0],
+        heading_rad: 0.7,
+        covariance: [[4e-4, 1e-4, 0.0], [1e-4, 9e-4, 0.0], [0.0, 0.0, 1e-4]],
+        extent: 4.7,
+        objects: Vec::new(),
+        support: None,
+    }
+}
+
+/// A square of `side` metres.
+fn square_plan(side: f64) -> v1::GdbPlan {
+    let corners = [[0.0, 0.0], [0.0, side], [side, side], [side, 0.0]];
+    v1::GdbPlan {
+        height_m: 0.3,
+        draft: 1,
+        library: 0,
+        objects: vec![v1::PlanObject {
+            id: uuid::Uuid::from_u128(5),
+            kind: v1::ObjectKind::Machine,
+            tolerance_m: 0.03,
+            trust: 0.5,
+        }],
+        outlines: vec![corners.map(|at_m| v1::PlanCorner { at_m, object: 0 }).to_vec()],
+        sheets: Vec::new(),
+        openings: Vec::new(),
+    }
+}
+
+fn places(mirror: &Mirror) -> Vec<f64> {
+    let mut places: Vec<f64> = mirror.landmarks().map(|landmark| landmark.at.x).collect();
+    places.sort_by(f64::total_cmp);
+    places
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn landmarks_and_model_come_with_the_map_and_are_asked_for_only_when_they_may_have_changed() {
+    let stub = with_contributions(0..3);
+    stub.ledger().landmarks = vec![(2, corner(1.0)), (3, corner(2.0))];
+    stub.ledger().plan = Some((2, square_plan(4.0)));
+    let folder = tempfile::tempdir().unwrap();
+    let mut mirror = open(&folder);
+    mirror.refresh(&api_of(&stub)).await.unwrap();
+    assert_eq!(places(&mirror), [1.0, 2.0]);
+    assert_eq!(mirror.surfaces().len(), 4);
+    drop(mirror);
+    // They are on disk.
+    let mut mirror = open(&folder);
+    assert_eq!((places(&mirror), mirror.surfaces().len()), (vec![1.0, 2.0], 4));
+    // The next ones: one more, one less, the model as it was.
+    stub.ledger().take(&contributions(3..5));
+    stub.ledger().landmarks.push((5, corner(7.0)));
+    stub.ledger().gone.push((4, "convex:1".to_owned()));
+    mirror.refresh(&api_of(&stub)).await.unwrap();
+    assert_eq!((places(&mirror), stub.ledger().plans), (vec![2.0, 7.0], 1));
+    // Nothing new: no question, or this refusal would be told.
+    stub.ledger().refuses_landmarks.push_back((503, "closing"));
+    mirror.refresh(&api_of(&stub)).await.unwrap();
+    stub.ledger().refuses_landmarks.clear();
+    // Another publication; what changed since is no longer known.
+    stub.ledger().take(&contributions(5..6));
+    stub.ledger().plan = Some((6, square_plan(9.0)));
+    stub.ledger().refuses_landmarks.push_back((410, "cursor_expired"));
+    mirror.refresh(&api_of(&stub)).await.unwrap();
+    assert_eq!(stub.ledger().plans, 2);
+    assert!((mirror.surfaces()[0].to.metres().y - 9.0).abs() < 1e-9);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_model_that_cannot_be_cut_leaves_the_map_and_landmarks_that_cannot_be_are_refused() {
+    let stub = with_contributions(0..3);
+    stub.ledger().landmarks = vec![(2, corner(1.0))];
+    stub.ledger().refuses_landmarks.push_back((409, "plan_too_crowded"));
+    let folder = tempfile::tempdir().unwrap();
+    let mut mirror = open(&folder);
+    mirror.refresh(&api_of(&stub)).await.unwrap();
+    assert_eq!(mirror.map(), stub.ledger().map());
+    assert!(mirror.landmarks().next().is_none());
+    stub.ledger().take(&contributions(3..4));
+    let mut bad = corner(4.0);
+    bad.covariance[0][0] = -1.0;
+    stub.ledger().landmarks.push((4, bad));
+    let error = mirror.refresh(&api_of(&stub)).await.unwrap_err();
+    assert!(
+        error.to_string().starts_with("the landmarks of revision 4 cannot be taken"),
+        "{error}"
+    );
+    stub.ledger().landmarks.pop();
+    mirror.refresh(&api_of(&stub)).await.unwrap();
+    assert_eq!(places(&mirror), [1.0], "asked for from the beginning");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_level_that_was_made_anew_takes_its_landmarks_with_it() {
+    let stub = with_contributions(0..5);
+    stub.ledger().landmarks = vec![(2, corner(1.0))];
+    stub.ledger().plan = Some((2, square_plan(4.0)));
+    let folder = tempfile::tempdir().unwrap();
+    let mut mirror = open(&folder);
+    mirror.refresh(&api_of(&stub)).await.unwrap();
+    stub.ledger().make_anew(Uuid::from_bytes([3; 16]));
+    stub.ledger().landmarks.clear();
+    stub.ledger().plan = None;
+    mirror.refresh(&api_of(&stub)).await.unwrap();
+    assert_eq!((places(&mirror).len(), mirror.surfaces().len()), (0, 0));
 }
 
 /// A file of format `version`, whose map nobody can read any more.

@@ -83,6 +83,16 @@ pub(in crate::sync) struct Ledger {
     pub(in crate::sync) pages: usize,
     /// What the level is said to hold, if not what it holds.
     pub(in crate::sync) counts: Option<v1::Counts>,
+    /// Landmarks of the level, with the revision at which each came.
+    pub(in crate::sync) landmarks: Vec<(i64, v1::Landmark)>,
+    /// Landmarks that are no more, with the revision at which each went.
+    pub(in crate::sync) gone: Vec<(i64, String)>,
+    /// The published model's plan and its publication.
+    pub(in crate::sync) plan: Option<(i64, v1::GdbPlan)>,
+    /// What questions for landmarks are answered with instead, once each.
+    pub(in crate::sync) refuses_landmarks: VecDeque<(u16, &'static str)>,
+    /// Questions for plans.
+    pub(in crate::sync) plans: usize,
     in_hand: usize,
     receipts: BTreeMap<Uuid, v1::Receipt>,
     /// The map at each revision, from 0 on; every acknowledged contribution is one revision.
@@ -106,6 +116,11 @@ impl Ledger {
             bytes_in: 0,
             pages: 0,
             counts: None,
+            landmarks: Vec::new(),
+            gone: Vec::new(),
+            plan: None,
+            refuses_landmarks: VecDeque::new(),
+            plans: 0,
             in_hand: 0,
             receipts: BTreeMap::new(),
             history: vec![Level::new(LevelConfig::standard(RESOLUTION_M))],
@@ -235,6 +250,8 @@ fn serve(ledger: &Shared, address: SocketAddr) -> (SocketAddr, Runtime) {
         .route(route::LEVEL, get(describe))
         .route(route::PATCHES, get(patches))
         .route(route::VECTOR, get(vector))
+        .route(route::LANDMARKS, get(landmarks))
+        .route(route::GDB_PLAN, get(plan))
         .route(route::SITES, get(sites).post(sites))
         .with_state(Arc::clone(ledger));
     // Bound on a thread of its own: a runtime's thread may not wait for another runtime.
@@ -402,6 +419,32 @@ async fn describe(State(shared): State<Shared>, headers: HeaderMap) -> Response 
             counts: ledger.counts.unwrap_or_else(|| counts(ledger.map())),
             published: None,
         },
+    )
+}
+
+async fn landmarks(State(shared): State<Shared>, Query(asked): Query<Since>) -> Response {
+    let mut ledger = shared.lock().unwrap();
+    if let Some((status, code)) = ledger.refuses_landmarks.pop_front() {
+        return refused(&problem(status, code));
+    }
+    let told = ledger.landmarks.iter().filter(|(revision, _)| *revision > asked.since);
+    let gone = ledger.gone.iter().filter(|(revision, _)| *revision > asked.since);
+    let table = v1::LandmarkTable {
+        revision: ledger.revision(),
+        publication: ledger.plan.as_ref().map_or(0, |(publication, _)| *publication),
+        height_m: 0.3,
+        landmarks: told.map(|(_, landmark)| landmark.clone()).collect(),
+        removed: gone.map(|(_, id)| id.clone()).collect(),
+    };
+    written(200, &table)
+}
+
+async fn plan(State(shared): State<Shared>) -> Response {
+    let mut ledger = shared.lock().unwrap();
+    ledger.plans += 1;
+    ledger.plan.as_ref().map_or_else(
+        || refused(&problem(404, "publication_not_found")),
+        |(_, plan)| written(200, plan),
     )
 }
 
