@@ -24,6 +24,7 @@ if [ -d ../shared/data/plans ]; then "$evaluate" buildings --report BENCHMARKS.m
 "$evaluate" structures --report BENCHMARKS.md
 "$evaluate" localization --report BENCHMARKS.md
 "$evaluate" places --report BENCHMARKS.md --data ../shared/data
+"$evaluate" looks --report BENCHMARKS.md --data ../shared/data
 "$evaluate" alignment --report BENCHMARKS.md --data ../shared/data
 if [ -d ../shared/data/logs ]; then "$evaluate" trajectories --report BENCHMARKS.md --data ../shared/data; fi
 "$evaluate" growth --report BENCHMARKS.md --data ../shared/data

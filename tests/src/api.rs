@@ -131,6 +131,21 @@ impl Api {
         self.post(path, JSON, body).await
     }
 
+    /// The server's address.
+    pub fn url(&self) -> &str {
+        &self.url
+    }
+
+    /// `POST` of nothing, for the version that `if_match` names.
+    ///
+    /// # Errors
+    /// No answer.
+    pub async fn post_matching(&self, path: &str, if_match: &str) -> Result<Answer, Error> {
+        let url = format!("{}{path}", self.url);
+        let request = self.http.post(&url).header(ACCEPT, JSON).header(CONTENT_TYPE, JSON);
+        self.answer(url, request.header(IF_MATCH, if_match).body("null")).await
+    }
+
     /// `PUT` of a value as JSON, in the place of the version that `if_match` names.
     ///
     /// # Errors

@@ -25,14 +25,14 @@ const HEIGHT_M: f64 = 0.3;
 const LANDMARKS: [&str; 4] = ["concave_corner", "convex_corner", "wall_end", "doorway"];
 
 /// One building.
-struct Building {
+pub(crate) struct Building {
     /// What the table calls it.
-    name: &'static str,
+    pub(crate) name: &'static str,
     /// Its file below the folder of plans; of a map the YAML, which names the image beside it.
     file: &'static str,
-    media_type: &'static str,
+    pub(crate) media_type: &'static str,
     /// What the import is asked.
-    query: &'static str,
+    pub(crate) query: &'static str,
     /// The file that its picture is written to, if it gets one.
     picture: Option<&'static str>,
 }
@@ -40,7 +40,7 @@ struct Building {
 const YAML: &str = "application/yaml";
 const ZIP: &str = "application/zip";
 
-const BUILDINGS: [Building; 12] = [
+pub(crate) const BUILDINGS: [Building; 12] = [
     Building {
         name: "Open-RMF office",
         file: "rmf/office.building.yaml",
@@ -127,6 +127,21 @@ const BUILDINGS: [Building; 12] = [
     },
 ];
 
+impl Building {
+    /// What is uploaded of it, out of `data` (its folder `plans`) or the tests' own; `None` if there is no such file.
+    pub(crate) fn read(&self, data: &Path) -> Result<Option<Vec<u8>>, Error> {
+        let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("data").join(self.file);
+        let file = if beside.is_file() { beside } else { data.join("plans").join(self.file) };
+        if !file.is_file() {
+            return Ok(None);
+        }
+        if self.media_type == ZIP {
+            return zipped(&file).map(Some);
+        }
+        std::fs::read(&file).map(Some).map_err(|e| Error::file(&file, e))
+    }
+}
+
 const HEADER: [&str; 12] = [
     "building",
     "walls",
@@ -148,23 +163,15 @@ const HEADER: [&str; 12] = [
 /// # Errors
 /// The server fails, or a file cannot be read or written.
 pub async fn table(page: &Path, data: &Path, pictures: &Path) -> Result<Vec<String>, Error> {
-    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("data");
     let server = Server::start(Database::Sqlite).await?;
     let (mut rows, mut faults) = (Vec::new(), Vec::new());
     std::fs::create_dir_all(pictures).map_err(|e| Error::file(pictures, e))?;
     for (number, building) in BUILDINGS.iter().enumerate() {
-        let beside = own.join(building.file);
-        let file = if beside.is_file() { beside } else { data.join("plans").join(building.file) };
-        if !file.is_file() {
-            faults.push(format!("{}: there is no {}", building.name, file.display()));
+        let Some(body) = building.read(data)? else {
+            faults.push(format!("{}: there is no {}", building.name, building.file));
             continue;
-        }
-        let level = Level::create(server.api()?, &format!("b{number}"), "l").await?;
-        let body = if building.media_type == ZIP {
-            zipped(&file)?
-        } else {
-            std::fs::read(&file).map_err(|e| Error::file(&file, e))?
         };
+        let level = Level::create(server.api()?, &format!("b{number}"), "l").await?;
         let path = format!("{}{}", level.path(route::IMPORTS), building.query);
         let begin = Instant::now();
         level.api.post(&path, building.media_type, body).await?.expect(201)?;

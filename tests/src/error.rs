@@ -52,6 +52,9 @@ pub enum Error {
     /// A robot that cannot survey.
     #[error("survey: {0}")]
     Survey(mapfold_client::robot::SurveyorError),
+    /// The client library refuses, or has no answer.
+    #[error("client: {0}")]
+    Client(String),
     /// A floor with more surface than is held against a map.
     #[error("{0}")]
     Surface(mapfold_map::changes::TooMuchSurface),

@@ -23,6 +23,7 @@
 //! * [`differences`]: what is told of a floor that is not as its model, and how soon.
 //! * [`buildings`]: what comes of real buildings that are taken in as models.
 //! * [`plans`]: what vast models cost.
+//! * [`planned`]: levels with nothing but the model of a building, and the building as it stands.
 //! * [`serving`]: how long a server takes to answer about small and vast rasters.
 //! * [`places`]: whether a robot that knows nothing finds its place on recorded logs.
 //! * [`localization`]: how well a robot is tracked, and whether it notices that it is lost.
@@ -55,6 +56,7 @@ pub mod meter;
 pub mod page;
 pub mod places;
 pub mod plane;
+pub mod planned;
 pub mod plans;
 pub mod programs;
 pub mod range;

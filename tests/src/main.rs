@@ -111,6 +111,15 @@ enum Command {
         #[arg(long, value_name = "DIR")]
         data: Option<PathBuf>,
     },
+    /// Asks single looks for their places, on logs that are not in the maps and on plans of real buildings
+    Looks {
+        /// The page with the markers `looks` and `on-plans`
+        #[arg(long, value_name = "FILE")]
+        report: PathBuf,
+        /// The folder with the real data, in `logs/` and `plans/`
+        #[arg(long, value_name = "DIR")]
+        data: PathBuf,
+    },
     /// Aligns maps that robots made in frames of their own, out of logs that are cut in two
     Alignment {
         /// The page with the markers `alignment`
@@ -184,9 +193,10 @@ async fn main() -> ExitCode {
         }
         Command::Plans { report } => plans::table(&report),
         Command::Serving { report } => serving::tables(&report).await,
-        Command::Structures { report } => structures::table(&report),
+        Command::Structures { report } => structures::table(&report).await,
         Command::Localization { report } => localization::tables(&report),
         Command::Places { report, data } => places::table(&report, data.as_deref()),
+        Command::Looks { report, data } => places::single_looks(&report, &data).await,
         Command::Alignment { report, data } => alignment::table(&report, data.as_deref()),
         Command::Trajectories { report, data, only } => {
             trajectory::table(&report, &data, only.as_deref()).await

@@ -1,6 +1,8 @@
 //! Global localization on landmark tables: does a robot that sees a few landmarks, some of which are
 //! none, find its place, and how long does that take?
 
+mod download;
+
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
@@ -154,11 +156,12 @@ const COUNTS: [usize; 6] = [50, 200, 500, 1_000, 10_000, 100_000];
 const VIEWS: [(usize, usize); 3] = [(5, 1), (8, 2), (12, 3)];
 const QUERIES: u32 = 1000;
 
-/// Measures all sizes and views, and rewrites the table `structures` of a page.
+/// Measures all sizes and views, and rewrites the tables `structures` and `tables` of a page.
 ///
 /// # Errors
-/// The page cannot be read or written.
-pub fn table(page: &Path) -> Result<Vec<String>, Error> {
+/// The page cannot be read or written; the server that tells tables fails.
+pub async fn table(page: &Path) -> Result<Vec<String>, Error> {
+    download::table(page).await?;
     let started = tokio::time::Instant::now();
     let now = || started.elapsed().as_secs_f64();
     let (mut rows, mut faults) = (Vec::new(), Vec::new());

@@ -300,7 +300,14 @@ impl LikelihoodField {
             }
         }
         let is_free = |known: &Known| matches!(known, Known::Free | Known::Presumed);
-        let free: Vec<u8> = known.iter().map(|known| u8::from(is_free(known))).collect();
+        let free_count = known.iter().filter(|known| is_free(known)).count();
+        let occupied_count = known.iter().filter(|known| **known == Known::Occupied).count();
+        // Walls that do not close make no rooms: a robot may be anywhere but in them.
+        let has_rooms = 2 * free_count > occupied_count;
+        let is_floor = |known: &Known| {
+            if has_rooms { is_free(known) } else { *known != Known::Occupied }
+        };
+        let free: Vec<u8> = known.iter().map(|known| u8::from(is_floor(known))).collect();
         let search = &mut self.search;
         search.cell = self.resolution * factor as f64;
         search.size = (width, height);
