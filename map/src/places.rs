@@ -20,7 +20,7 @@ use crate::geometry::{Level, Point, Robot, UncertainPose};
 
 pub use field::LikelihoodField;
 pub(crate) use field::{Known, STEPS, walls_of};
-pub use search::{place_near, search, search_near};
+pub use search::{place_near, pose_at, search, search_near};
 
 /// A beam of a look that hit something, in the robot frame.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use mapfold_map::geometry::{Level, Point, Pose, Robot, difference};
 use mapfold_map::level::LevelMap;
 use mapfold_map::places::{
-    Beam, LikelihoodField, PlacesConfig, View, place_near, search, search_near,
+    Beam, LikelihoodField, PlacesConfig, View, place_near, pose_at, search, search_near,
 };
 use mapfold_map::raster::{Cell, TILE_CELLS, Tile, TileIndex};
 
@@ -167,6 +167,26 @@ fn of_two_equal_rooms_both_are_told_and_proposals_change_nothing() {
     let wrong = Pose::new(3.0, 1.0, 2.0);
     let helped = search(&field, &view, &[twin, wrong]);
     assert_eq!(helped.places.len(), found.places.len());
+}
+
+#[test]
+fn a_place_is_as_certain_as_what_is_seen_from_it() {
+    let floor = angled(0.0);
+    let room = field(&floor);
+    let truth = Pose::new(1.2, 4.0, 0.7);
+    let seen = view(&floor, &truth);
+    let at = pose_at(&room, &seen, &place_near(&room, &seen, &truth));
+    assert!((at.pose.position() - truth.position()).norm() < 0.03, "{at:?}");
+    assert!(difference(at.pose.heading(), truth.heading()).abs() < 0.01, "{at:?}");
+    assert!((0..2).all(|i| at.covariance.sd(i) < 0.05) && at.covariance.sd(2) < 0.03, "{at:?}");
+    // In the middle of a corridor whose ends are out of sight, along it anything is as likely.
+    let corridor = vec![[0.0, 0.0, 24.0, 2.0]];
+    let long = field(&corridor);
+    let truth = Pose::new(12.0, 1.0, 0.0);
+    let mut seen = view(&corridor, &truth);
+    seen.beams.retain(|beam| beam.to.norm() < 8.0);
+    let at = pose_at(&long, &seen, &place_near(&long, &seen, &truth));
+    assert!(at.covariance.sd(0) > 0.12 && at.covariance.sd(1) < 0.03, "{at:?}");
 }
 
 #[test]

@@ -23,7 +23,7 @@ use crate::{Error, logs, report};
 use answers::{Answers, in_view};
 
 /// Cells of the maps, metres.
-const RESOLUTION_M: f64 = 0.05;
+pub(crate) const RESOLUTION_M: f64 = 0.05;
 /// Scans in a block of a log: every other one makes the map, and each of the others is driven from its first scan on.
 const BLOCK: usize = 20;
 /// A pose this far off the log's is wrong: metres, radians. The log's own poses err by some centimetres.
@@ -35,10 +35,10 @@ const REACH_M: f64 = 10.0;
 const SINGLE_MAX: usize = 300;
 
 /// One scan of a log.
-struct Look {
+pub(crate) struct Look {
     scan: Scan,
-    contribution: Contribution,
-    view: View,
+    pub(crate) contribution: Contribution,
+    pub(crate) view: View,
     odom_from_robot: Option<Pose<Odom, Robot>>,
 }
 
@@ -83,7 +83,11 @@ impl Mapped {
 
 const REACHES: [&str; 2] = ["reaches", "does not reach"];
 
-fn looks(path: &Path) -> Result<Vec<Look>, Error> {
+/// What the scans of a log show at the log's poses.
+///
+/// # Errors
+/// The log cannot be read, or has no scanner.
+pub(crate) fn looks(path: &Path) -> Result<Vec<Look>, Error> {
     let fault = |fault: String| Error::Log { path: path.to_owned(), line: 0, fault };
     let log: Log = carmen::read(path).map_err(|e| fault(e.to_string()))?;
     let sensors = SensorChoice::default().choose(&log).map_err(|e| fault(e.to_string()))?;

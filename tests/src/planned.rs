@@ -5,6 +5,7 @@
 use std::collections::BTreeMap;
 
 use mapfold_client::sync::{Api as ClientApi, ApiOptions, LevelAddress, Mirror, MirrorConfig};
+use mapfold_map::raster::Cell;
 use mapfold_schema::codec::JSON;
 use mapfold_schema::route;
 use mapfold_schema::v1::{GdbPlan, PlanCorner};
@@ -76,8 +77,17 @@ impl Planned {
             let at =
                 Point::new(x.0 + noise.share() * (x.1 - x.0), y.0 + noise.share() * (y.1 - y.0));
             let near = self.near(at, WITHIN_M);
-            (near.is_clear(at) && near.encloses(at)).then_some(at)
+            (near.is_clear(at) && near.encloses(at) && !self.is_solid(at)).then_some(at)
         })
+    }
+
+    /// Whether the prior says that a place is inside of something.
+    fn is_solid(&self, at: Point) -> bool {
+        let Some(resolution) = self.mirror.resolution_m() else { return false };
+        let [column, row] = [at.x, at.y].map(|v| (v / resolution).floor() as i32);
+        let (index, offset) = Cell { column, row }.tile();
+        let tile = self.mirror.map().prior.get(&index);
+        tile.and_then(|tile| tile.cells().get(offset)).is_some_and(|value| *value > 0)
     }
 
     /// What of the building is within some metres of a place.

@@ -9,10 +9,12 @@
 use std::collections::BTreeMap;
 
 use mapfold_map::gdb::{ObjectId, PlanPoint};
-use mapfold_map::geometry::{Covariance, Level, Pose, Robot, UncertainPose, mahalanobis_sq};
+use mapfold_map::geometry::{
+    Covariance, Level, Pose, Robot, UncertainPose, difference, mahalanobis_sq,
+};
 use mapfold_map::landmarks::LandmarkKind;
 use mapfold_map::level::FeatureId;
-use nalgebra::{Cholesky, Matrix3, SMatrix, SVector};
+use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
 
 /// A wall that looks are held against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -71,6 +73,22 @@ impl<const N: usize> Measurement<N> {
 struct Kept {
     cross: Matrix3<f64>,
     met: u64,
+}
+
+/// A pose that would count for less than the rest of this is left out.
+const WEIGHT_MAX: f64 = 0.99;
+
+/// The share of `a` in the intersection of two poses with these informations: where `ln det(w a + (1 - w) b)`, which is
+/// concave, is greatest.
+fn own_weight(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..20 {
+        let weight = f64::midpoint(low, high);
+        let rises = Cholesky::new(a * weight + b * (1.0 - weight))
+            .is_none_or(|factor| factor.solve(&(a - b)).trace() > 0.0);
+        if rises { low = weight } else { high = weight }
+    }
+    f64::midpoint(low, high)
 }
 
 /// The filter's state.
@@ -137,6 +155,32 @@ impl Filter {
         let factor = Cholesky::new(spread)?;
         let ln_determinant = (0..N).map(|i| 2.0 * factor.l()[(i, i)].ln()).sum();
         off_sq.is_finite().then_some((off_sq, ln_determinant))
+    }
+
+    /// Takes in a pose whose error may have anything in common with this one's, as both come from the same look and the
+    /// same map: covariance intersection (Julier and Uhlmann 1997), `P^-1 = w A^-1 + (1 - w) B^-1` with the `w` that makes `P`
+    /// smallest.
+    pub(super) fn intersect(&mut self, other: &UncertainPose<Level, Robot>) {
+        let own = self.level_from_robot;
+        let informations = (own.covariance.information(), other.covariance.information());
+        let (Some(a), Some(b)) = informations else { return };
+        let weight = own_weight(&a, &b);
+        if weight >= WEIGHT_MAX {
+            return;
+        }
+        if weight <= 1.0 - WEIGHT_MAX {
+            *self = Self::new(*other);
+            return;
+        }
+        self.level_from_robot.covariance = own.covariance.scaled(1.0 / weight);
+        let (to, from) = (&other.pose, &own.pose);
+        let turn = difference(to.heading(), from.heading());
+        self.update(&Measurement {
+            innovation: Vector3::new(to.x - from.x, to.y - from.y, turn),
+            j_pose: Matrix3::identity(),
+            j_errors: Vec::new(),
+            noise: *other.covariance.scaled(1.0 / (1.0 - weight)).matrix(),
+        });
     }
 
     /// Takes a measurement in, in Joseph's form. Leaves all as it was if the numbers do not allow it.

@@ -4,7 +4,7 @@ use mapfold_map::gdb::Surface;
 use mapfold_map::geometry::{Level, Pose, Robot, UncertainPose, difference, mahalanobis_sq};
 use mapfold_map::landmarks::{Landmark, LandmarkTable, LearnedConfig, landmarks_of_map};
 use mapfold_map::level::LevelMap;
-use mapfold_map::places::{LikelihoodField, PlacesConfig, View, place_near, search_near};
+use mapfold_map::places::{LikelihoodField, PlacesConfig, View, place_near, pose_at, search_near};
 use mapfold_map::vector::ObservedSegment;
 
 use nalgebra::Vector3;
@@ -276,16 +276,20 @@ impl Kept {
     ) -> Result<Localized, Lost> {
         let predicted = *self.tracker.pose();
         let mut report = self.tracker.seen(segments, &known.walls, known.table.as_ref());
-        let mut judged = judge(&known.field, view, self.tracker.pose(), &config.check);
-        let is_lost = matches!(self.tracker.state(), Tracking::Lost(_));
-        if is_lost || !matches!(judged, Judged::BorneOut) {
-            // Wheels that slip, or err in a way that is not yet known, leave the robot near: it need not be lost.
-            if let Some(fix) = found_near(&known.field, view, &predicted, &config.check) {
-                self.tracker = Tracker::new(fix, config.tracker);
+        // What walls do not tell, and wheels err in, the raster may: where there is just one place around, it is that.
+        if let Some(place) = found_near(&known.field, view, &predicted, &config.check) {
+            let is_lost = matches!(self.tracker.state(), Tracking::Lost(_));
+            if is_lost || !self.tracker.agrees(&place) {
+                self.tracker = Tracker::new(place, config.tracker);
                 report = self.tracker.seen(segments, &known.walls, known.table.as_ref());
-                judged = judge(&known.field, view, self.tracker.pose(), &config.check);
+                if !self.tracker.agrees(&place) {
+                    self.tracker = Tracker::new(place, config.tracker);
+                    report = TrackReport::default();
+                }
             }
+            self.tracker.found(&place);
         }
+        let judged = judge(&known.field, view, self.tracker.pose(), &config.check);
         let pose = match self.tracker.state() {
             Tracking::Tracked(pose) => pose,
             Tracking::Lost(why) => return Err(why),
@@ -321,12 +325,7 @@ fn judge(
     config: &CheckConfig,
 ) -> Judged {
     let place = place_near(field, view, &pose.pose);
-    let off = {
-        let (a, b) = (&place.level_from_robot.pose, &pose.pose);
-        Vector3::new(a.x - b.x, a.y - b.y, difference(a.heading(), b.heading()))
-    };
-    let covariance = place.level_from_robot.covariance + pose.covariance;
-    let is_there = mahalanobis_sq(&off, &covariance) <= config.off_sq;
+    let is_there = is_within(pose, &pose_at(field, view, &place), config);
     if is_there && place.hits >= config.hits_min {
         Judged::BorneOut
     } else if place.gain() < config.gain_min || (!is_there && place.hits >= config.hits_min) {
@@ -334,6 +333,17 @@ fn judge(
     } else {
         Judged::Untold
     }
+}
+
+/// Whether two poses may be one, as far as their deviations go.
+fn is_within(
+    a: &UncertainPose<Level, Robot>,
+    b: &UncertainPose<Level, Robot>,
+    config: &CheckConfig,
+) -> bool {
+    let turn = difference(a.pose.heading(), b.pose.heading());
+    let off = Vector3::new(a.pose.x - b.pose.x, a.pose.y - b.pose.y, turn);
+    mahalanobis_sq(&off, &(a.covariance + b.covariance)) <= config.off_sq
 }
 
 /// The one place around a pose that a look fits, if there is just one.
@@ -349,5 +359,5 @@ fn found_near(
     let best = found.places.first().filter(|best| best.hits >= config.hits_min)?;
     let others = found.places[1..].iter().map(|place| place.fit).chain([found.rest]);
     let others: f64 = others.map(|fit| (fit - best.fit).exp()).sum();
-    (others.ln() < -field.odds()).then(|| fix_of(&best.level_from_robot))
+    (others.ln() < -field.odds()).then(|| fix_of(&pose_at(field, view, best)))
 }

@@ -393,3 +393,26 @@ fn the_model_tells_what_the_map_does_not_and_nobody_has_seen_through() {
         assert_eq!(covers(x, 2.3), [true], "{x}");
     }
 }
+
+#[test]
+fn a_pose_from_the_same_look_is_taken_in_without_counting_anything_twice() {
+    let start = fix(Pose::new(2.0, 3.0, 0.1), [0.01, 1.0, 0.02]);
+    let mut tracker = Tracker::new(start, TrackerConfig::STANDARD);
+    // The same once more is no news.
+    tracker.found(&start);
+    let same = tracked(&tracker);
+    assert!((same.pose.x - 2.0).abs() < 1e-9 && (same.covariance.sd(1) - 1.0).abs() < 1e-6);
+    // What knows the other direction tells it: either counts half.
+    let other = fix(Pose::new(2.5, 3.4, 0.1), [1.0, 0.01, 0.02]);
+    tracker.found(&other);
+    let both = tracked(&tracker);
+    assert!((both.pose.x - 2.0).abs() < 0.001 && (both.pose.y - 3.4).abs() < 0.001, "{both:?}");
+    for i in [0, 1] {
+        assert!((both.covariance.sd(i) - 0.01 * 2_f64.sqrt()).abs() < 1e-4, "{both:?}");
+    }
+    assert!((both.covariance.sd(2) - 0.02).abs() < 1e-6, "{both:?}");
+    // What knows less of everything changes nothing.
+    tracker.found(&fix(Pose::new(9.0, 9.0, 1.0), [2.0, 2.0, 1.0]));
+    let still = tracked(&tracker);
+    assert!((still.pose.x - both.pose.x).abs() < 1e-9, "{still:?}");
+}

@@ -152,6 +152,11 @@ impl Tracker {
         mahalanobis_sq(&off, &(fix.covariance + own.covariance)) <= 16.266
     }
 
+    /// Something else has found the same pose in the same look, on the same map.
+    pub fn found(&mut self, place: &UncertainPose<Level, Robot>) {
+        self.filter.intersect(place);
+    }
+
     /// The wheels have counted a step: the robot's pose now in its own frame before.
     pub fn moved(&mut self, step: &Pose<Robot, Robot>) {
         self.has_moved = true;

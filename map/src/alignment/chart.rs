@@ -89,13 +89,13 @@ mod tests {
 
     #[test]
     fn what_is_left_of_a_wall_lies_in_its_middle() {
-        // Three cells thick, aslant to the squares.
+        // Three cells thick, aslant to the squares: any one cell of each would be off by some 5 cm.
         let cells = (0..400).flat_map(|along| {
             let along = f64::from(along) * 0.05;
             [-0.05, 0.0, 0.05].map(|off| Point::new(along - 0.6 * off, 0.6 * along + off))
         });
         let left = thinned(cells, 0.2);
         let off = left.iter().map(|p| p.y - 0.6 * p.x).sum::<f64>() / left.len() as f64;
-        assert!(left.len() > 100 && off.abs() < 0.002, "{off} {}", left.len());
+        assert!(left.len() > 100 && off.abs() < 0.005, "{off} {}", left.len());
     }
 }

@@ -44,8 +44,8 @@ fn tally(onto: &Chart, points: impl Iterator<Item = Point>, config: &AlignmentCo
             match onto.field.known(&p) {
                 // Close to a wall is neither here nor there.
                 Known::Free if onto.field.fit(&p) == 0 => tally.conflicting += 1,
-                Known::Free | Known::Occupied | Known::Built => tally.doubtful += 1,
-                Known::Nothing | Known::Presumed => {}
+                Known::Free | Known::Occupied => tally.doubtful += 1,
+                Known::Nothing | Known::Presumed | Known::Built | Known::Unvisited => {}
             }
         }
     }

@@ -121,6 +121,11 @@ impl Pairs {
         Self { groups: groups.collect() }
     }
 
+    /// Bytes that they take.
+    pub(super) fn bytes(&self) -> usize {
+        self.len() * (size_of::<f32>() + size_of::<[f32; 2]>() + size_of::<[u32; 2]>())
+    }
+
     /// Number of pairs.
     pub(super) fn len(&self) -> usize {
         self.groups.iter().map(|group| group.lengths.len()).sum()

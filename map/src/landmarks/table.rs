@@ -14,7 +14,7 @@ pub(super) const PAIR_SD_MAX: f64 = 0.15;
 /// Edge of the squares that landmarks are found by, metres.
 const SQUARE: f64 = 2.0;
 
-/// Landmarks of one level and the pairs among them. Takes some 40 bytes a landmark and 16 a pair.
+/// Landmarks of one level and the pairs among them. Takes some 72 bytes a landmark and 20 a pair.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LandmarkTable {
     pub(super) landmarks: Vec<Landmark>,
@@ -50,6 +50,11 @@ impl LandmarkTable {
         let all = self.grid.near(&at, reach);
         let numbered = all.map(|number| (number, &self.landmarks[number as usize]));
         numbered.filter(move |(_, l)| (l.at - at).norm_squared() <= reach * reach)
+    }
+
+    /// Bytes that its landmarks and pairs take.
+    pub fn bytes(&self) -> usize {
+        self.landmarks.len() * size_of::<Landmark>() + self.pairs.bytes()
     }
 
     /// Number of pairs.

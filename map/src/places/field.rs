@@ -24,9 +24,11 @@ pub(crate) enum Known {
     Presumed,
     Free,
     Occupied,
-    /// Occupied as far as the prior tells. Deep inside of something solid that is nothing a beam could end on; see
-    /// [`LikelihoodField::bury`], after which there are none.
+    /// Solid as far as the prior tells, and deep inside: no beam ends there, and no robot stands there.
     Built,
+    /// Nothing, where only the prior knows anything at all. If that has hardly any rooms, as the walls of drawings often
+    /// do not close, a robot may stand there.
+    Unvisited,
 }
 
 /// A level's raster as a search reads it.
@@ -90,10 +92,22 @@ impl LikelihoodField {
             sonar: layer(SensorClass::Sonar, tile),
             walls: None,
         };
-        let known = |tile| layered(tile).said(0..TILE_CELLS).map(|said| of_said(said, config));
-        let tiles = places.into_iter().map(|tile| (tile, known(tile).collect()));
+        let known = |tile| {
+            let layers = layered(tile);
+            let is_visited = layers.scanner.or(layers.sonar).is_some();
+            let known = layers.said(0..TILE_CELLS).map(|said| match of_said(said, config) {
+                Known::Nothing if !is_visited => Known::Unvisited,
+                known => known,
+            });
+            (tile, known.collect())
+        };
+        let tiles = places.into_iter().map(known);
+        let of_prior = || map.prior.values().flat_map(|tile| tile.cells());
+        let rooms = of_prior().filter(|value| **value < 0).count();
+        let has_rooms =
+            map.prior.is_empty() || rooms > 2 * of_prior().filter(|value| **value > 0).count();
         let walls = walls_of(map).chain(walls);
-        Self::of_known(&tiles.collect::<Vec<_>>(), walls, resolution, config)
+        Self::of_known(&tiles.collect::<Vec<_>>(), has_rooms, walls, resolution, config)
     }
 
     /// Of tiles with what is known of their cells, and of walls with free space on the left.
@@ -107,12 +121,13 @@ impl LikelihoodField {
             tile.cells().iter().map(|cell| of_evidence(LogOdds(*cell), config)).collect()
         };
         let tiles = tiles.into_iter().map(|(index, tile)| (index, known(&tile)));
-        Self::of_known(&tiles.collect::<Vec<_>>(), walls, resolution, config)
+        Self::of_known(&tiles.collect::<Vec<_>>(), true, walls, resolution, config)
     }
 
-    /// Of tiles of cells.
+    /// Of tiles of cells. If what is free in them does not make rooms, a robot may also stand where nobody has been.
     fn of_known(
         tiles: &[(TileIndex, Vec<Known>)],
+        has_rooms: bool,
         walls: impl IntoIterator<Item = (Point, Point)>,
         resolution: f64,
         config: &PlacesConfig,
@@ -154,7 +169,7 @@ impl LikelihoodField {
         field.bury();
         field.fits = field.known.iter().map(|known| fit(*known, best, config)).collect();
         field.soften();
-        field.search_field((columns, rows));
+        field.search_field((columns, rows), has_rooms);
         field
     }
 
@@ -170,10 +185,10 @@ impl LikelihoodField {
             let mut around =
                 (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy)));
             let is_deep = around.all(|(dx, dy)| is_solid(x + dx, y + dy));
-            found.push((at, if is_deep { Known::Nothing } else { Known::Occupied }));
+            found.extend((!is_deep).then_some(at));
         }
-        for (at, known) in found {
-            self.known[at] = known;
+        for at in found {
+            self.known[at] = Known::Occupied;
         }
     }
 
@@ -262,32 +277,36 @@ impl LikelihoodField {
         self.index_of(p).map_or(Known::Nothing, |at| self.known[at])
     }
 
-    fn search_field(&mut self, (columns, rows): (usize, usize)) {
+    fn search_field(&mut self, (columns, rows): (usize, usize), has_rooms: bool) {
         let (wide, high) = (columns * TILE_SIDE, rows * TILE_SIDE);
         let mut factor = ((self.config.cell / self.resolution).round() as usize).max(1);
         while (wide / factor) * (high / factor) > CELLS_MAX {
             factor *= 2;
         }
         let (width, height) = (wide.div_ceil(factor), high.div_ceil(factor));
-        let mut counts = vec![(0_u32, 0_u32, 0_u32); width * height];
+        let mut counts = vec![(0_u32, 0_u32, 0_u32, 0_u32); width * height];
         for (tile, slot) in self.slots.iter().enumerate() {
-            let Some(slot) = slot.checked_sub(1) else { continue };
             let (x, y) = (tile % columns * TILE_SIDE, tile / columns * TILE_SIDE);
-            let cells = &self.known[slot as usize * TILE_CELLS..][..TILE_CELLS];
-            for (offset, known) in cells.iter().enumerate() {
+            let cells = slot.checked_sub(1).map(|slot| &self.known[slot as usize * TILE_CELLS..]);
+            for offset in 0..TILE_CELLS {
+                // Where there is no tile nobody has been.
+                let known = cells.map_or(Known::Unvisited, |cells| cells[offset]);
                 let (x, y) = (x + offset % TILE_SIDE, y + offset / TILE_SIDE);
                 let count = &mut counts[y / factor * width + x / factor];
-                count.0 += u32::from(*known == Known::Occupied);
-                count.1 += u32::from(*known == Known::Free);
-                count.2 += u32::from(*known == Known::Presumed);
+                count.0 += u32::from(known == Known::Occupied);
+                count.1 += u32::from(known == Known::Free);
+                count.2 += u32::from(known == Known::Presumed);
+                count.3 += u32::from(known == Known::Unvisited);
             }
         }
         let most = |of: u32| 2 * of as usize >= factor * factor;
-        let of_cell = |(occupied, free, presumed): &(u32, u32, u32)| match (occupied, free) {
-            (1.., _) => Known::Occupied,
-            (0, free) if most(*free) => Known::Free,
-            (0, free) if most(free + presumed) => Known::Presumed,
-            _ => Known::Nothing,
+        let of_cell = |(occupied, free, presumed, unvisited): &(u32, u32, u32, u32)| match occupied
+        {
+            1.. => Known::Occupied,
+            0 if most(*free) => Known::Free,
+            0 if most(free + presumed) => Known::Presumed,
+            0 if most(free + presumed + unvisited) => Known::Unvisited,
+            0 => Known::Nothing,
         };
         let known: Vec<Known> = counts.iter().map(of_cell).collect();
         let mut fits: Vec<u8> =
@@ -299,13 +318,10 @@ impl LikelihoodField {
                     .fill(self.best);
             }
         }
-        let is_free = |known: &Known| matches!(known, Known::Free | Known::Presumed);
-        let free_count = known.iter().filter(|known| is_free(known)).count();
-        let occupied_count = known.iter().filter(|known| **known == Known::Occupied).count();
-        // Walls that do not close make no rooms: a robot may be anywhere but in them.
-        let has_rooms = 2 * free_count > occupied_count;
-        let is_floor = |known: &Known| {
-            if has_rooms { is_free(known) } else { *known != Known::Occupied }
+        let is_floor = |known: &Known| match known {
+            Known::Free | Known::Presumed => true,
+            Known::Unvisited => !has_rooms,
+            _ => false,
         };
         let free: Vec<u8> = known.iter().map(|known| u8::from(is_floor(known))).collect();
         let search = &mut self.search;
@@ -370,8 +386,8 @@ fn of_said(said: Said, config: &PlacesConfig) -> Known {
 
 fn fit(known: Known, best: u8, config: &PlacesConfig) -> u8 {
     let cost = match known {
-        Known::Occupied | Known::Built => 0.0,
-        Known::Nothing => config.unknown_cost,
+        Known::Occupied => 0.0,
+        Known::Nothing | Known::Unvisited | Known::Built => config.unknown_cost,
         Known::Presumed => config.presumed_cost,
         Known::Free => config.free_cost,
     };

@@ -9,9 +9,9 @@ use std::collections::BinaryHeap;
 
 use super::field::{LikelihoodField, STEPS};
 use super::pyramid::LEVELS;
-use super::weigh::{refined, weighed};
+use super::weigh::{posterior, refined, weighed};
 use super::{Beam, Found, Place, View};
-use crate::geometry::{Level, Point, Pose, Robot, difference};
+use crate::geometry::{Level, Point, Pose, Robot, UncertainPose, difference};
 
 /// Poses so close to one that was tried would be moved to the same place: metres, radians.
 const TRIED: (f64, f64) = (0.25, 0.03);
@@ -42,6 +42,13 @@ type Turned = Vec<Vec<i64>>;
 pub fn place_near(field: &LikelihoodField, view: &View, pose: &Pose<Level, Robot>) -> Place {
     let beams = thinned(&view.beams, field.config.beams_max);
     weighed(field, &beams, &refined(field, &beams, *pose))
+}
+
+/// Where the robot is if it is at this place, by all that the look shows: mean and covariance over the poses that count as
+/// this place.
+pub fn pose_at(field: &LikelihoodField, view: &View, place: &Place) -> UncertainPose<Level, Robot> {
+    let beams = thinned(&view.beams, field.config.beams_max);
+    posterior(field, &beams, &place.level_from_robot.pose)
 }
 
 /// Finds where the look that `view` is can have been taken: all places, if there are not too many, that

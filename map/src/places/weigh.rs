@@ -48,6 +48,46 @@ pub(super) fn refined(
     pose
 }
 
+/// Steps to either side in which the posterior around a place is taken.
+const SPREAD_STEPS: i32 = 6;
+
+/// Mean and covariance of what the ends of beams make of all poses that count as one place with `pose`, every one as
+/// likely before as any other (Olson 2009). Unlike the covariance of [`Place`], it counts what is no wall, and that walls
+/// which were hit may be others nearby. Along what the look does not tell, it is that of a uniform distribution.
+pub(super) fn posterior(
+    field: &LikelihoodField,
+    beams: &[Beam],
+    pose: &Pose<Level, Robot>,
+) -> UncertainPose<Level, Robot> {
+    let config = &field.config;
+    let (apart, turned) = config.apart;
+    let step = (0.5 * apart / f64::from(SPREAD_STEPS), 0.5 * turned / f64::from(SPREAD_STEPS));
+    let best = f64::from(ends(field, beams, pose));
+    let steps = -SPREAD_STEPS..=SPREAD_STEPS;
+    let (mut all, mut first, mut second) = (0.0, Vector3::zeros(), Matrix3::zeros());
+    for turn in steps.clone() {
+        for x in steps.clone() {
+            for y in steps.clone() {
+                let off = [f64::from(x) * step.0, f64::from(y) * step.0, f64::from(turn) * step.1];
+                let at = Pose::new(pose.x + off[0], pose.y + off[1], pose.heading() + off[2]);
+                let ahead = f64::from(ends(field, beams, &at)) - best;
+                let weight = (config.temper * ahead / STEPS).exp();
+                let off = Vector3::from(off);
+                all += weight;
+                first += off * weight;
+                second += off * off.transpose() * weight;
+            }
+        }
+    }
+    let mean = first / all;
+    let within = Vector3::new(step.0, step.0, step.1).map(|step| step * step / 12.0);
+    let covariance = second / all - mean * mean.transpose() + Matrix3::from_diagonal(&within);
+    UncertainPose {
+        pose: Pose::new(pose.x + mean.x, pose.y + mean.y, pose.heading() + mean.z),
+        covariance: Covariance::new(covariance).unwrap_or_else(|_| untold(field)),
+    }
+}
+
 /// The place at a pose, with how well it fits.
 pub(super) fn weighed(field: &LikelihoodField, beams: &[Beam], pose: &Pose<Level, Robot>) -> Place {
     let config = &field.config;
@@ -110,7 +150,7 @@ fn passes_through(field: &LikelihoodField, from: &Point, to: &Point) -> bool {
         match field.known(&(from + way * along)) {
             Known::Occupied | Known::Built => is_inside = true,
             Known::Free | Known::Presumed if is_inside => return true,
-            Known::Free | Known::Presumed | Known::Nothing => {}
+            Known::Free | Known::Presumed | Known::Unvisited | Known::Nothing => {}
         }
     }
     false

@@ -22,7 +22,7 @@ use crate::simulation::{Noise, Scanner, World};
 use crate::{Error, report};
 
 /// Places from which robots look, in each building.
-const PLACES: u64 = 100;
+const PLACES: u64 = 60;
 /// Corners of the building stand off by this, metres (standard deviation).
 const OFF_M: f64 = 0.015;
 /// Ranges err by this, metres (standard deviation).

@@ -53,15 +53,14 @@ pub(super) async fn table(page: &Path) -> Result<(), Error> {
         if landmarks.len() != count {
             return Err(Error::Client(format!("{} landmarks of {count}", landmarks.len())));
         }
-        let (before, begin) = (resident_bytes(), Instant::now());
+        let begin = Instant::now();
         let table = LandmarkTable::new(landmarks);
         let ms = 1e3 * begin.elapsed().as_secs_f64();
-        let kept = resident_bytes().saturating_sub(before);
         cells.extend([
             format!("{:.0}", bytes as f64 / 1e3),
             format!("{ms:.1}"),
             table.pair_count().to_string(),
-            format!("{:.1}", kept as f64 / 1e6),
+            format!("{:.1}", table.bytes() as f64 / 1e6),
         ]);
         report::say(&cells.join(" | "));
         rows.push(cells);
@@ -97,11 +96,4 @@ fn pillars(count: usize) -> Value {
     };
     let features: Vec<Value> = numbers.chunks(SOLIDS).enumerate().map(feature).collect();
     json!({"type": "FeatureCollection", "features": features})
-}
-
-/// Memory of this process that is in use, as the kernel counts it; 0 where it does not.
-fn resident_bytes() -> u64 {
-    let statm = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
-    let pages = statm.split_whitespace().nth(1).and_then(|pages| pages.parse::<u64>().ok());
-    pages.unwrap_or(0) * 4096
 }
