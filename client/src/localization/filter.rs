@@ -75,6 +75,18 @@ struct Kept {
     met: u64,
 }
 
+/// Squared Mahalanobis distance between two poses.
+pub(super) fn apart_sq(a: &UncertainPose<Level, Robot>, b: &UncertainPose<Level, Robot>) -> f64 {
+    mahalanobis_sq(&step_to(a, b), &(a.covariance + b.covariance))
+}
+
+/// From one pose to another, component by component.
+fn step_to(from: &UncertainPose<Level, Robot>, to: &UncertainPose<Level, Robot>) -> Vector3<f64> {
+    let (from, to) = (&from.pose, &to.pose);
+    let turn = difference(to.heading(), from.heading());
+    Vector3::new(to.x - from.x, to.y - from.y, turn)
+}
+
 /// A pose that would count for less than the rest of this is left out.
 const WEIGHT_MAX: f64 = 0.99;
 
@@ -173,10 +185,8 @@ impl Filter {
             return;
         }
         self.level_from_robot.covariance = own.covariance.scaled(1.0 / weight);
-        let (to, from) = (&other.pose, &own.pose);
-        let turn = difference(to.heading(), from.heading());
         self.update(&Measurement {
-            innovation: Vector3::new(to.x - from.x, to.y - from.y, turn),
+            innovation: step_to(&own, other),
             j_pose: Matrix3::identity(),
             j_errors: Vec::new(),
             noise: *other.covariance.scaled(1.0 / (1.0 - weight)).matrix(),

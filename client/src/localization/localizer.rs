@@ -1,15 +1,14 @@
 //! The whole of localization: seek until the place is certain, track until it is not, and seek again.
 
 use mapfold_map::gdb::Surface;
-use mapfold_map::geometry::{Level, Pose, Robot, UncertainPose, difference, mahalanobis_sq};
+use mapfold_map::geometry::{Level, Pose, Robot, UncertainPose};
 use mapfold_map::landmarks::{Landmark, LandmarkTable, LearnedConfig, landmarks_of_map};
 use mapfold_map::level::LevelMap;
 use mapfold_map::places::{LikelihoodField, PlacesConfig, View, place_near, pose_at, search_near};
 use mapfold_map::vector::ObservedSegment;
 
-use nalgebra::Vector3;
-
 use super::drift::{Drift, DriftConfig};
+use super::filter::apart_sq;
 use super::seeker::{Candidate, Fix, Seeker, SeekerConfig, fix_of};
 use crate::sensor::{Ring, SonarProfile};
 
@@ -325,7 +324,7 @@ fn judge(
     config: &CheckConfig,
 ) -> Judged {
     let place = place_near(field, view, &pose.pose);
-    let is_there = is_within(pose, &pose_at(field, view, &place), config);
+    let is_there = apart_sq(pose, &pose_at(field, view, &place)) <= config.off_sq;
     if is_there && place.hits >= config.hits_min {
         Judged::BorneOut
     } else if place.gain() < config.gain_min || (!is_there && place.hits >= config.hits_min) {
@@ -333,17 +332,6 @@ fn judge(
     } else {
         Judged::Untold
     }
-}
-
-/// Whether two poses may be one, as far as their deviations go.
-fn is_within(
-    a: &UncertainPose<Level, Robot>,
-    b: &UncertainPose<Level, Robot>,
-    config: &CheckConfig,
-) -> bool {
-    let turn = difference(a.pose.heading(), b.pose.heading());
-    let off = Vector3::new(a.pose.x - b.pose.x, a.pose.y - b.pose.y, turn);
-    mahalanobis_sq(&off, &(a.covariance + b.covariance)) <= config.off_sq
 }
 
 /// The one place around a pose that a look fits, if there is just one.

@@ -2,12 +2,12 @@
 
 use std::f64::consts::PI;
 
-use mapfold_map::geometry::{Level, Pose, Robot, UncertainPose, mahalanobis_sq, unit_normal};
+use mapfold_map::geometry::{Level, Pose, Robot, UncertainPose, unit_normal};
 use mapfold_map::landmarks::{FacesConfig, LandmarkTable, ObservedLandmark, landmarks_of_look};
 use mapfold_map::vector::ObservedSegment;
 use nalgebra::Vector3;
 
-use super::filter::{Filter, Measurement, WallName};
+use super::filter::{Filter, Measurement, WallName, apart_sq};
 use super::lines::{self, Reach};
 use super::reference_walls::{ReferenceWall, ReferenceWalls};
 use super::watchdog::{Tracking, Verdict, Watchdog, WatchdogConfig};
@@ -143,13 +143,7 @@ impl Tracker {
     /// Whether a fix that was found without this pose agrees with it (99.9 %). If a fix does not, one of the two is
     /// wrong: whoever believes the fix starts a new tracker from it.
     pub fn agrees(&self, fix: &UncertainPose<Level, Robot>) -> bool {
-        let own = self.filter.pose();
-        let off: Vector3<f64> = Vector3::new(
-            fix.pose.x - own.pose.x,
-            fix.pose.y - own.pose.y,
-            mapfold_map::geometry::difference(fix.pose.heading(), own.pose.heading()),
-        );
-        mahalanobis_sq(&off, &(fix.covariance + own.covariance)) <= 16.266
+        apart_sq(self.filter.pose(), fix) <= 16.266
     }
 
     /// Something else has found the same pose in the same look, on the same map.

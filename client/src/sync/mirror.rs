@@ -15,6 +15,7 @@ mod landmarks;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
 use mapfold_map::gdb::Surface;
@@ -169,7 +170,7 @@ pub struct Mirror {
     /// Absent before the first refresh.
     ground: Option<Ground>,
     known: KnownMap,
-    landmarks: KnownLandmarks,
+    landmarks: Arc<KnownLandmarks>,
     /// Why the next refresh is to begin from nothing.
     resync: Option<ResyncReason>,
     /// Whether the disk holds less than this.
@@ -227,7 +228,7 @@ impl Mirror {
             config,
             ground: None,
             known: KnownMap::default(),
-            landmarks: KnownLandmarks::default(),
+            landmarks: Arc::default(),
             resync: None,
             is_ahead_of_disk: false,
             counts_are_checked: true,
@@ -428,7 +429,7 @@ impl Mirror {
         let mut known = KnownMap::default();
         while take_page(api, &self.level, self.config.page_limit, &mut known, changes).await? {}
         self.known = known;
-        self.landmarks = KnownLandmarks::default();
+        self.landmarks = Arc::default();
         self.ground = Some(ground_of(level));
         self.resync = None;
         self.is_ahead_of_disk = true;
@@ -455,7 +456,7 @@ impl Mirror {
         let told = match api.landmarks(&self.level, self.landmarks.since()).await {
             // What changed since is not known any more.
             Err(error) if error.is_refusal("cursor_expired") => {
-                self.landmarks = KnownLandmarks::default();
+                self.landmarks = Arc::default();
                 api.landmarks(&self.level, 0).await
             }
             told => told,
@@ -463,7 +464,7 @@ impl Mirror {
         let table = match told {
             Err(error) if error.is_refusal("plan_too_crowded") => {
                 tracing::warn!(level = %self.level, %error, "going by the map alone");
-                self.landmarks = KnownLandmarks::untold(self.known.revision);
+                self.landmarks = Arc::new(KnownLandmarks::untold(self.known.revision));
                 self.is_ahead_of_disk = true;
                 return Ok(());
             }
@@ -477,7 +478,7 @@ impl Mirror {
         };
         let revision = table.revision;
         let bad = |violations| MirrorError::BadLandmarks { revision, violations };
-        self.landmarks = self.landmarks.with(table, plan).map_err(bad)?;
+        Arc::make_mut(&mut self.landmarks).take(table, plan).map_err(bad)?;
         self.is_ahead_of_disk = true;
         Ok(())
     }
@@ -490,7 +491,7 @@ impl Mirror {
             level: self.level.clone(),
             ground,
             known: self.known.clone(),
-            landmarks: self.landmarks.clone(),
+            landmarks: Arc::clone(&self.landmarks),
         };
         let folder = self.folder.clone();
         match spawn_blocking(move || file::write(&folder, &saved)).await {

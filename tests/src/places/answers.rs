@@ -32,8 +32,8 @@ pub(super) fn in_view(scan: &Scan, pose: &Pose<Level, Robot>, table: &LandmarkTa
     near.filter(|(_, landmark)| is_seen(&landmark.at)).count()
 }
 
-/// A pose is refuted if what is seen from there fits less than a place that is on no map, but fits the pose that was told, near
-/// by, and another one by more than this, nat.
+/// A log's pose is refuted if the scan fits it less well than a place that is on no map, and the pose that was told, near by, better
+/// by more than this, nat.
 const REFUTED_NAT: f64 = 20.0;
 /// Metres.
 const NEAR_BY_M: f64 = 1.0;

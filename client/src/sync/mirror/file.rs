@@ -16,6 +16,7 @@
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use mapfold_map::level::{LevelMap, apply, diff};
 use mapfold_schema::border::{map_patch, wire_patch};
@@ -42,7 +43,7 @@ pub(super) struct Saved {
     pub(super) level: LevelAddress,
     pub(super) ground: Ground,
     pub(super) known: KnownMap,
-    pub(super) landmarks: KnownLandmarks,
+    pub(super) landmarks: Arc<KnownLandmarks>,
 }
 
 /// The payload; all but the map is the same in every version.
@@ -64,7 +65,7 @@ impl<M> Content<M> {
             level: LevelAddress { site: self.site, level: self.level },
             ground: Ground { frame: self.frame, resolution_m: self.resolution_m },
             known,
-            landmarks: landmarks.map_err(|violations| format!("{violations:?}"))?,
+            landmarks: Arc::new(landmarks.map_err(|violations| format!("{violations:?}"))?),
         })
     }
 }

@@ -58,29 +58,29 @@ impl KnownLandmarks {
         publication != self.told.publication
     }
 
-    /// With what has changed, all of it or nothing. `plan` is that of the table's publication, if it is another than
+    /// Takes over what has changed, all of it or nothing. `plan` is that of the table's publication, if it is another than
     /// before.
-    pub(super) fn with(
-        &self,
+    pub(super) fn take(
+        &mut self,
         table: v1::LandmarkTable,
         plan: Option<v1::GdbPlan>,
-    ) -> Result<Self, Wrong> {
-        let mut next = self.clone();
+    ) -> Result<(), Wrong> {
+        let read: Vec<Landmark> =
+            table.landmarks.iter().map(map_landmark).collect::<Result<_, _>>()?;
+        if self.needs_plan(table.publication) {
+            self.surfaces = surfaces_of(plan.as_ref())?;
+            (self.told.plan, self.told.publication) = (plan, table.publication);
+        }
         for id in &table.removed {
-            next.landmarks.remove(id);
-            next.told.landmarks.remove(id);
+            self.landmarks.remove(id);
+            self.told.landmarks.remove(id);
         }
-        for landmark in table.landmarks {
-            next.landmarks.insert(landmark.id.clone(), map_landmark(&landmark)?);
-            next.told.landmarks.insert(landmark.id.clone(), landmark);
+        for (landmark, read) in table.landmarks.into_iter().zip(read) {
+            self.landmarks.insert(landmark.id.clone(), read);
+            self.told.landmarks.insert(landmark.id.clone(), landmark);
         }
-        if next.needs_plan(table.publication) {
-            next.surfaces = plan.as_ref().map(map_surfaces).transpose()?.unwrap_or_default();
-            next.told.plan = plan;
-            next.told.publication = table.publication;
-        }
-        (next.told.revision, next.asked) = (table.revision, table.revision);
-        Ok(next)
+        (self.told.revision, self.asked) = (table.revision, table.revision);
+        Ok(())
     }
 
     /// Nothing: what the server has of a revision cannot be told.
@@ -98,8 +98,12 @@ impl KnownLandmarks {
         Ok(Self {
             asked: told.revision,
             landmarks: told.landmarks.iter().map(read).collect::<Result<_, Wrong>>()?,
-            surfaces: told.plan.as_ref().map(map_surfaces).transpose()?.unwrap_or_default(),
+            surfaces: surfaces_of(told.plan.as_ref())?,
             told,
         })
     }
+}
+
+fn surfaces_of(plan: Option<&v1::GdbPlan>) -> Result<Vec<Surface>, Wrong> {
+    plan.map_or_else(|| Ok(Vec::new()), map_surfaces)
 }

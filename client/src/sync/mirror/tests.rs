@@ -264,7 +264,7 @@ fn the_prior_is_on_disk_with_the_rest() {
     cells[71..90].fill(-25);
     known.map.prior.insert(TileIndex { x: -3, y: 8 }, Arc::new(Tile::new(cells)));
     let ground = Ground { frame: FRAME, resolution_m: 0.05 };
-    let landmarks = KnownLandmarks::default();
+    let landmarks = Arc::default();
     let saved = Saved { level: level(), ground, known: known.clone(), landmarks };
     file::write(folder.path(), &saved).unwrap();
     let mirror = open(&folder);
