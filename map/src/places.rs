@@ -73,7 +73,8 @@ pub struct PlacesConfig {
     pub free_cost: f64,
     /// What one that ends in what is presumed to be free costs: furniture is in no plan, nat.
     pub presumed_cost: f64,
-    /// What one costs that passes through a wall, nat. Little: glass, and walls grazed.
+    /// What one costs that passes through a wall, besides, nat: glass, and walls grazed, are rarer than places that only
+    /// resemble the right one.
     pub through_cost: f64,
     /// Deviation of beams' ends from the cells of the walls that they hit, metres.
     pub spread: f64,
@@ -95,6 +96,9 @@ pub struct PlacesConfig {
     pub margin: f64,
     /// Places closer than this are one: metres, radians.
     pub apart: (f64, f64),
+    /// In a search of the whole map places are told down to this below what one of so many must fit by chance, so that it is
+    /// known by how much the best is ahead, nat.
+    pub below_chance: f64,
     /// Most places that are told.
     pub places_max: usize,
     /// Most blocks of places that are looked into.
@@ -112,9 +116,9 @@ impl PlacesConfig {
         presumed: -0.4,
         skin: 0.05,
         unknown_cost: 1.0,
-        free_cost: 3.0,
+        free_cost: 2.2,
         presumed_cost: 1.5,
-        through_cost: 0.3,
+        through_cost: 1.0,
         spread: 0.08,
         temper: 0.5,
         elsewhere: 0.9,
@@ -125,9 +129,10 @@ impl PlacesConfig {
         odds: 6.9,
         margin: 3.0,
         apart: (0.5, 0.3),
+        below_chance: 4.0,
         places_max: 64,
-        blocks_max: 600_000,
-        tries_max: 1500,
+        blocks_max: 2_000_000,
+        tries_max: 6000,
     };
 }
 

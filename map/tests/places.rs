@@ -122,6 +122,38 @@ fn a_room_unlike_any_other_is_found_from_anywhere_in_it() {
 }
 
 #[test]
+fn walls_that_no_map_has_hide_no_place() {
+    // Boards lean about the room: of the walls in sight none has a direction of the map's.
+    let floor = angled(3.0);
+    let field = field(&floor);
+    for turned in [0.3, 0.7, -0.4] {
+        let truth = Pose::new(4.2, 5.1, -2.0);
+        let mut view = view(&floor, &truth);
+        let boards = Pose::<Robot, Robot>::new(0.0, 0.0, turned);
+        view.walls.truncate(1);
+        view.walls.iter_mut().for_each(|(a, b)| (*a, *b) = (boards.act(a), boards.act(b)));
+        let found = search(&field, &view, &[]);
+        let best = found.places.first().unwrap();
+        assert!(is_at(&best.level_from_robot.pose, &truth), "{turned}: {best:?}");
+    }
+}
+
+#[test]
+fn what_is_seen_through_a_wall_costs_also_where_nothing_is_known_behind_it() {
+    let room = vec![[0.0, 0.0, 6.0, 4.0]];
+    let field = field(&room);
+    let at = Pose::new(3.0, 2.0, 0.0);
+    let throughs = |x: f64, y: f64| {
+        let to = Point::new(x, y);
+        let beams = vec![Beam { from: Point::zeros(), to, normal: None }; 40];
+        place_near(&field, &View { beams, walls: Vec::new() }, &at).throughs
+    };
+    assert!(throughs(0.0, 2.0) < 0.01, "ends on it");
+    assert!(throughs(0.0, 2.3) < 0.01, "ranges err, and walls are thick");
+    assert!(throughs(0.0, 4.0) > 0.99, "ends far behind it");
+}
+
+#[test]
 fn a_plan_alone_tells_a_robot_its_place() {
     let floor = angled(3.0);
     let walls = floor.iter().flat_map(sides);

@@ -1,4 +1,4 @@
-//! Headings that bring walls that are seen onto directions of walls that are known.
+//! Headings, those first that bring walls that are seen onto directions of walls that are known.
 
 use std::f64::consts::TAU;
 
@@ -8,10 +8,10 @@ use crate::geometry::Point;
 const BINS: usize = 360;
 /// A direction is one of the map's if so many metres of wall have it, or this share of all.
 const COMMON: (f64, f64) = (3.0, 0.004);
-/// With less wall in sight, or less of it along directions of the map, any heading may be.
+/// With less wall in sight, or less of it along directions of the map, all headings are alike.
 const SEEN_MIN_M: f64 = 1.0;
 const SHARE_MIN: f64 = 0.5;
-/// Headings are tried that bring this share of what the best one brings onto walls.
+/// Headings are likely that bring this share of what the best one brings onto walls.
 const SHARE_OF_BEST: f64 = 0.6;
 
 /// Metres of wall by direction, free space on the left.
@@ -43,9 +43,9 @@ impl Directions {
         Self { metres: (0..BINS).map(near).collect() }
     }
 
-    /// Headings to try for a robot that sees these walls, radians, a degree apart where they follow each
-    /// other: all of them if its walls say nothing.
-    pub(super) fn headings(&self, seen: &[(Point, Point)]) -> Vec<f64> {
+    /// All headings of a robot that sees these walls, radians, a degree apart: the likely ones, or all if its walls say
+    /// nothing, and the others. Walls that are seen need not be any that are known, so that those may be right as well.
+    pub(super) fn headings(&self, seen: &[(Point, Point)]) -> [Vec<f64>; 2] {
         let heading = |i: usize| (i as f64) * TAU / BINS as f64;
         let seen: Vec<(f64, f64)> = seen.iter().map(of_wall).collect();
         let in_sight: f64 = seen.iter().map(|wall| wall.1).sum();
@@ -60,8 +60,9 @@ impl Directions {
             .collect();
         let best = onto_walls.iter().copied().fold(0.0, f64::max);
         let says_nothing = in_sight < SEEN_MIN_M || best < SHARE_MIN * in_sight;
-        let is_tried = |i: &usize| says_nothing || onto_walls[*i] >= SHARE_OF_BEST * best;
-        (0..BINS).filter(is_tried).map(heading).collect()
+        let is_likely = |i: &usize| says_nothing || onto_walls[*i] >= SHARE_OF_BEST * best;
+        let (likely, others): (Vec<_>, Vec<_>) = (0..BINS).partition(is_likely);
+        [likely, others].map(|bins| bins.into_iter().map(heading).collect())
     }
 }
 
@@ -83,19 +84,20 @@ mod tests {
                 off.min(360.0 - off) <= 1.5
             })
         };
-        let headings = room.headings(&[wall(20.5, 4.0), wall(110.5, 3.0)]);
+        let [headings, others] = room.headings(&[wall(20.5, 4.0), wall(110.5, 3.0)]);
         assert!(headings.len() <= 12, "{}", headings.len());
+        assert_eq!(headings.len() + others.len(), BINS);
         assert!([340.0, 70.0, 160.0, 250.0].iter().all(|d| around(&headings, *d)));
         let one_sided = Directions::new([wall(0.5, 10.0)]);
-        let headings = one_sided.headings(&[wall(20.5, 4.0)]);
-        assert!(around(&headings, 340.0) && !around(&headings, 160.0));
+        let [headings, others] = one_sided.headings(&[wall(20.5, 4.0)]);
+        assert!(around(&headings, 340.0) && !around(&headings, 160.0) && around(&others, 160.0));
     }
 
     #[test]
-    fn without_walls_any_heading_may_be() {
+    fn without_walls_all_headings_are_alike() {
         let room = Directions::new([wall(0.5, 10.0)]);
-        assert_eq!(room.headings(&[]).len(), BINS);
-        assert_eq!(room.headings(&[wall(0.0, 0.5)]).len(), BINS);
-        assert_eq!(Directions::new([]).headings(&[wall(0.0, 5.0)]).len(), BINS);
+        assert_eq!(room.headings(&[])[0].len(), BINS);
+        assert_eq!(room.headings(&[wall(0.0, 0.5)])[0].len(), BINS);
+        assert_eq!(Directions::new([]).headings(&[wall(0.0, 5.0)])[0].len(), BINS);
     }
 }

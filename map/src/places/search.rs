@@ -1,15 +1,15 @@
 //! All places that a look fits nearly as well as the best, by branch and bound.
 //!
 //! Blocks of places, heading by heading, are looked into in the order of what their best place can come to
-//! at most; a block that cannot come near the best place found so far is never opened. A block of one
-//! place is moved to where it fits best and weighed in full. The bound holds for what the ends of the beams come to
+//! at most, those with likely headings first; a block that cannot come near the best place found so far is never opened. A
+//! block of one place is moved to where it fits best and weighed in full. The bound holds for what the ends of the beams come to
 //! on cells of the search, which forgive what is off by less than one of them.
 
-use std::collections::BinaryHeap;
+use std::ops::Range;
 
 use super::field::{LikelihoodField, STEPS};
 use super::pyramid::LEVELS;
-use super::weigh::{posterior, refined, weighed};
+use super::weigh::{fit_of_ends, posterior, refined, weighed};
 use super::{Beam, Found, Place, View};
 use crate::geometry::{Level, Point, Pose, Robot, UncertainPose, difference};
 
@@ -25,7 +25,7 @@ const NEAR_LEVEL: u8 = 3;
 const CHUNK: usize = 16;
 
 /// A block of places at one heading.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy)]
 struct Block {
     /// What its best place comes to at most, in steps.
     bound: u32,
@@ -33,6 +33,33 @@ struct Block {
     heading: u16,
     x: i32,
     y: i32,
+}
+
+/// Blocks by their bounds, of which there are some thousands: taking the best of millions costs no more than of a few.
+#[derive(Default)]
+struct Blocks {
+    by_bound: Vec<Vec<Block>>,
+}
+
+impl Blocks {
+    fn push(&mut self, block: Block) {
+        let bound = block.bound as usize;
+        if bound >= self.by_bound.len() {
+            self.by_bound.resize_with(bound + 1, Vec::new);
+        }
+        self.by_bound[bound].push(block);
+    }
+
+    /// One with the greatest bound, the last of them that came.
+    fn pop(&mut self) -> Option<Block> {
+        while let Some(last) = self.by_bound.last_mut() {
+            if let Some(block) = last.pop() {
+                return Some(block);
+            }
+            self.by_bound.pop();
+        }
+        None
+    }
 }
 
 /// The ends of beams at one heading, as offsets into each level of the field.
@@ -52,7 +79,7 @@ pub fn pose_at(field: &LikelihoodField, view: &View, place: &Place) -> Uncertain
 }
 
 /// Finds where the look that `view` is can have been taken: all places, if there are not too many, that
-/// fit it as well as the best to within the odds and the margin, and better than one of so many must by chance. `proposals` are poses to begin with, from landmarks that
+/// fit it as well as the best to within the odds and the margin, and nearly as well as one of so many must by chance. `proposals` are poses to begin with, from landmarks that
 /// were matched for instance; the answer does not depend on them, only the time that it takes.
 pub fn search(field: &LikelihoodField, view: &View, proposals: &[Pose<Level, Robot>]) -> Found {
     let headings = field.search.directions.headings(&view.walls);
@@ -61,7 +88,7 @@ pub fn search(field: &LikelihoodField, view: &View, proposals: &[Pose<Level, Rob
         level: LEVELS as u8 - 1,
         x: (0, width as i32 - 1),
         y: (0, height as i32 - 1),
-        ln_places: field.ln_places(),
+        floor: field.ln_places() - field.config.below_chance,
     };
     within(field, view, headings, &window, proposals)
 }
@@ -90,9 +117,10 @@ pub fn search_near(
         level: NEAR_LEVEL,
         x: span(around.x, corner.x, width),
         y: span(around.y, corner.y, height),
-        ln_places: places.ln(),
+        floor: places.ln(),
     };
-    within(field, view, (-steps..=steps).map(heading).collect(), &window, &[*around])
+    let headings = (-steps..=steps).map(heading).collect();
+    within(field, view, [headings, Vec::new()], &window, &[*around])
 }
 
 /// Where to search: blocks of a level from cell to cell.
@@ -100,14 +128,14 @@ struct Window {
     level: u8,
     x: (i32, i32),
     y: (i32, i32),
-    /// Logarithm of the number of places in it that can be told apart.
-    ln_places: f64,
+    /// Places that fit less are of no interest.
+    floor: f64,
 }
 
 fn within(
     field: &LikelihoodField,
     view: &View,
-    headings: Vec<f64>,
+    [likely, others]: [Vec<f64>; 2],
     window: &Window,
     proposals: &[Pose<Level, Robot>],
 ) -> Found {
@@ -119,6 +147,8 @@ fn within(
         let rest = config.temper * config.elsewhere * beams.len() as f64;
         return Found { places: Vec::new(), rest, blocks: 0 };
     }
+    let parties = [0..likely.len(), likely.len()..likely.len() + others.len()];
+    let headings = [likely, others].concat();
     let turned = headings.iter().map(|heading| turned(field, &near, *heading)).collect();
     let mut search = Search {
         field,
@@ -126,18 +156,21 @@ fn within(
         near: near.len(),
         headings,
         turned,
-        ln_places: window.ln_places,
+        floor: window.floor,
         least: 1,
         best: f64::NEG_INFINITY,
         places: Vec::new(),
         tried: Vec::new(),
+        opened: 0,
     };
-    // What is no likelier than a place elsewhere is of no interest: among so many, one fits by chance.
-    search.raise(window.ln_places);
+    search.raise(window.floor);
     for proposal in proposals {
         search.weigh(*proposal);
     }
-    let (rest, blocks) = search.run(window);
+    let rest = parties.into_iter().map(|headings| search.run(headings, window));
+    // In this order: what likely headings came to spares most of the others.
+    let rest = rest.fold(f64::NEG_INFINITY, f64::max);
+    let blocks = search.opened;
     let mut places = search.places;
     places.retain(|place| place.fit >= search.best - config.odds - config.margin);
     places.sort_by(|a, b| b.fit.total_cmp(&a.fit));
@@ -174,32 +207,34 @@ struct Search<'a> {
     near: usize,
     headings: Vec<f64>,
     turned: Vec<Turned>,
-    ln_places: f64,
+    /// Places that fit less are of no interest.
+    floor: f64,
     /// What a block must come to, in steps.
     least: u32,
     /// How well the best place so far fits.
     best: f64,
     places: Vec<Place>,
     tried: Vec<Pose<Level, Robot>>,
+    /// Blocks that were looked into.
+    opened: usize,
 }
 
 impl Search<'_> {
-    /// Looks into blocks until none can hold a place that matters; answers what no other place exceeds, and how
-    /// many blocks there were.
-    fn run(&mut self, window: &Window) -> (f64, usize) {
+    /// Looks into blocks with some of the headings until none can hold a place that matters; answers what no other place
+    /// exceeds that has one of these.
+    fn run(&mut self, headings: Range<usize>, window: &Window) -> f64 {
         let config = &self.field.config;
-        let mut blocks = self.coarsest(window);
-        let mut opened = 0;
+        let mut blocks = self.coarsest(headings, window);
         while let Some(block) = blocks.pop() {
             if block.bound < self.least {
                 break;
             }
-            opened += 1;
-            if opened > config.blocks_max
+            self.opened += 1;
+            if self.opened > config.blocks_max
                 || self.tried.len() >= config.tries_max
                 || self.places.len() >= config.places_max
             {
-                return (self.fit_of(block.bound), opened);
+                return self.fit_of(block.bound);
             }
             if self.is_known(&block) {
                 continue;
@@ -217,13 +252,13 @@ impl Search<'_> {
                 }
             }
         }
-        (self.fit_of(self.least), opened)
+        self.fit_of(self.least)
     }
 
-    fn coarsest(&self, window: &Window) -> BinaryHeap<Block> {
+    fn coarsest(&self, headings: Range<usize>, window: &Window) -> Blocks {
         let level = window.level;
-        let mut blocks = Vec::new();
-        for heading in 0..self.headings.len() as u16 {
+        let mut blocks = Blocks::default();
+        for heading in headings.start as u16..headings.end as u16 {
             for y in (window.y.0..=window.y.1).step_by(1 << level) {
                 for x in (window.x.0..=window.x.1).step_by(1 << level) {
                     let bound = self.bound(level, heading, x, y);
@@ -233,7 +268,7 @@ impl Search<'_> {
                 }
             }
         }
-        BinaryHeap::from(blocks)
+        blocks
     }
 
     /// What the best place of a block comes to at most; 0 if it is less than what matters.
@@ -275,8 +310,11 @@ impl Search<'_> {
         let side = f64::from((1_u32 << block.level) - 1) * self.field.search.cell;
         let is_within = |pose: &Pose<Level, Robot>, (reach, turn): (f64, f64)| {
             let off = |at: f64, lower: f64| (at - lower).abs().max((at - lower - side).abs());
-            difference(pose.heading(), heading).abs() < turn
-                && off(pose.x, lower.x).hypot(off(pose.y, lower.y)) < reach
+            let (x, y) = (off(pose.x, lower.x), off(pose.y, lower.y));
+            x < reach
+                && y < reach
+                && x * x + y * y < reach * reach
+                && difference(pose.heading(), heading).abs() < turn
         };
         let same = (0.8 * self.field.config.apart.0, SAME_HEADING);
         self.places.iter().any(|place| is_within(&place.level_from_robot.pose, same))
@@ -286,9 +324,15 @@ impl Search<'_> {
     /// Moves a pose to where it fits best and keeps it if it fits nearly as well as the best.
     fn weigh(&mut self, pose: Pose<Level, Robot>) {
         self.tried.push(pose);
-        let place = weighed(self.field, self.beams, &refined(self.field, self.beams, pose));
         let config = &self.field.config;
-        if place.fit < self.ln_places || place.fit < self.best - config.odds - config.margin {
+        let least = self.floor.max(self.best - config.odds - config.margin);
+        let refined = refined(self.field, self.beams, pose);
+        // What beams pass through can only cost.
+        if fit_of_ends(self.field, self.beams, &refined) < least {
+            return;
+        }
+        let place = weighed(self.field, self.beams, &refined);
+        if place.fit < least {
             return;
         }
         if place.fit > self.best {

@@ -88,6 +88,17 @@ pub(super) fn posterior(
     }
 }
 
+/// How well a look fits a pose by the ends of its beams alone: at least as well as with all that they pass through.
+pub(super) fn fit_of_ends(
+    field: &LikelihoodField,
+    beams: &[Beam],
+    pose: &Pose<Level, Robot>,
+) -> f64 {
+    let count = beams.len() as f64;
+    let cost = (f64::from(field.best) * count - f64::from(ends(field, beams, pose))) / STEPS;
+    field.config.temper * (field.config.elsewhere * count - cost)
+}
+
 /// The place at a pose, with how well it fits.
 pub(super) fn weighed(field: &LikelihoodField, beams: &[Beam], pose: &Pose<Level, Robot>) -> Place {
     let config = &field.config;
@@ -139,7 +150,8 @@ fn prior_information(field: &LikelihoodField) -> Matrix3<f64> {
     Matrix3::from_diagonal(&variances.map(|variance| 1.0 / variance))
 }
 
-/// Whether a beam comes out of something occupied into the free well before its end.
+/// Whether a beam comes out of something occupied well before its end. Behind most walls nothing is known: that makes
+/// them no thinner.
 fn passes_through(field: &LikelihoodField, from: &Point, to: &Point) -> bool {
     let way = to - from;
     let length = way.norm();
@@ -149,8 +161,8 @@ fn passes_through(field: &LikelihoodField, from: &Point, to: &Point) -> bool {
         let along = (OFF_SENSOR + f64::from(step) * STRIDE) / length;
         match field.known(&(from + way * along)) {
             Known::Occupied | Known::Built => is_inside = true,
-            Known::Free | Known::Presumed if is_inside => return true,
-            Known::Free | Known::Presumed | Known::Unvisited | Known::Nothing => {}
+            _ if is_inside => return true,
+            _ => {}
         }
     }
     false
