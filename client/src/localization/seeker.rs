@@ -26,7 +26,9 @@ pub struct SeekerConfig {
     pub way_full: f64,
     /// The same of turning, radians.
     pub turn_full: f64,
-    /// How far a place must be ahead of what one must fit by chance, nat: maps are not whole.
+    /// How much likelier a place must be than that the robot is nowhere on the map, as a logarithm.
+    pub weight_min: f64,
+    /// How far it must be ahead of all others in the looks that tell it apart, nat: maps are not whole.
     pub lead_min: f64,
     /// Least share of the beams of the last look that end on what is known to be occupied.
     pub hits_min: f64,
@@ -40,8 +42,9 @@ impl SeekerConfig {
         turn_min: 0.35,
         way_full: 1.5,
         turn_full: 1.0,
-        lead_min: 9.0,
-        hits_min: 0.6,
+        weight_min: 6.0,
+        lead_min: 6.9,
+        hits_min: 0.55,
     };
 }
 
@@ -212,13 +215,16 @@ impl Seeker {
         let odds = self.places.odds;
         let rest = self.rest.unwrap_or(0.0);
         let Some(best) = self.candidates.first() else {
-            return if rest > odds { Fix::Ambiguous(Vec::new()) } else { Fix::NoMatch };
+            let is_open = rest > self.config.weight_min;
+            return if is_open { Fix::Ambiguous(Vec::new()) } else { Fix::NoMatch };
         };
         let others = self.candidates[1..].iter().map(|c| c.weight).chain([rest]);
         let others: f64 = others.map(|weight| (weight - best.weight).exp()).sum();
-        if best.weight <= odds && rest <= odds {
+        let least = self.config.weight_min;
+        if best.weight <= least && rest <= least {
             Fix::NoMatch
-        } else if best.weight.min(-others.ln()) > odds
+        } else if best.weight > least
+            && -others.ln() > odds
             && best.lead > self.config.lead_min
             && best.hits >= self.config.hits_min
         {
