@@ -30,6 +30,9 @@ pub struct SeekerConfig {
     pub weight_min: f64,
     /// How far it must be ahead of all others in the looks that tell it apart, nat: maps are not whole.
     pub lead_min: f64,
+    /// A look in which it is ahead by less does not tell it apart, nat: cells, and what a map has wrong, make that much of
+    /// two places that are the same, look after look.
+    pub apart_min: f64,
     /// Least share of the beams of the last look that end on what is known to be occupied.
     pub hits_min: f64,
 }
@@ -44,6 +47,7 @@ impl SeekerConfig {
         turn_full: 1.0,
         weight_min: 6.0,
         lead_min: 6.9,
+        apart_min: 2.0,
         hits_min: 0.55,
     };
 }
@@ -189,7 +193,8 @@ impl Seeker {
             !self.is_same(&other.level_from_robot.pose, &place.level_from_robot.pose)
         });
         let ahead = place.fit - others.map(|other| other.fit).fold(found.rest, f64::max);
-        ahead / (1.0 + (found.places.len().max(1) as f64).ln())
+        let lead = ahead / (1.0 + (found.places.len().max(1) as f64).ln());
+        if lead.abs() < self.config.apart_min { 0.0 } else { lead }
     }
 
     fn is_same(&self, a: &Pose<Level, Robot>, b: &Pose<Level, Robot>) -> bool {
@@ -239,4 +244,26 @@ impl Seeker {
 pub(super) fn fix_of(place: &UncertainPose<Level, Robot>) -> UncertainPose<Level, Robot> {
     let least = Covariance::from_variances([4e-4, 4e-4, 2.5e-5]);
     UncertainPose { pose: place.pose, covariance: place.covariance + least }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_look_that_hardly_tells_two_places_apart_does_not_count() {
+        let place = |x: f64, fit: f64| {
+            let covariance = Covariance::from_variances([1e-4; 3]);
+            let level_from_robot = UncertainPose { pose: Pose::new(x, 0.0, 0.0), covariance };
+            Place { level_from_robot, fit, hits: 0.9, throughs: 0.0, beams: 80 }
+        };
+        let seeker = Seeker::new(SeekerConfig::STANDARD, PlacesConfig::STANDARD);
+        let lead = |other: f64| {
+            let places = vec![place(0.0, 30.0), place(20.0, other)];
+            seeker.lead(&places[0], &Found { places: places.clone(), rest: 6.0, blocks: 1 })
+        };
+        // The same hall at both ends of a building, and what cells make of that.
+        assert!(lead(28.0).abs() < 1e-12 && lead(31.5).abs() < 1e-12);
+        assert!(lead(22.0) > 4.0 && lead(38.0) < -4.0);
+    }
 }
