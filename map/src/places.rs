@@ -134,6 +134,10 @@ impl PlacesConfig {
         blocks_max: 2_000_000,
         tries_max: 6000,
     };
+    /// How well so many beams fit that cost so much in all, nat: above 0 if better than at a place that is not on the map.
+    fn fit(&self, beams: usize, cost: f64) -> f64 {
+        self.temper * (self.elsewhere * beams as f64 - cost)
+    }
 }
 
 /// A place that a look fits.

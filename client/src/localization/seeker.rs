@@ -30,7 +30,7 @@ pub struct SeekerConfig {
     pub weight_min: f64,
     /// How far it must be ahead of all others in the looks that tell it apart, nat: maps are not whole.
     pub lead_min: f64,
-    /// A look in which it is ahead by less does not tell it apart, nat: cells, and what a map has wrong, make that much of
+    /// A look that adds less to its lead does not tell it apart, nat: cells, and what a map has wrong, make that much of
     /// two places that are the same, look after look.
     pub apart_min: f64,
     /// Least share of the beams of the last look that end on what is known to be occupied.
@@ -217,19 +217,16 @@ impl Seeker {
     }
 
     fn fix(&self) -> Fix {
-        let odds = self.places.odds;
         let rest = self.rest.unwrap_or(0.0);
-        let Some(best) = self.candidates.first() else {
-            let is_open = rest > self.config.weight_min;
-            return if is_open { Fix::Ambiguous(Vec::new()) } else { Fix::NoMatch };
-        };
+        let best = self.candidates.first();
+        if best.map_or(rest, |best| best.weight.max(rest)) <= self.config.weight_min {
+            return Fix::NoMatch;
+        }
+        let Some(best) = best else { return Fix::Ambiguous(Vec::new()) };
         let others = self.candidates[1..].iter().map(|c| c.weight).chain([rest]);
         let others: f64 = others.map(|weight| (weight - best.weight).exp()).sum();
-        let least = self.config.weight_min;
-        if best.weight <= least && rest <= least {
-            Fix::NoMatch
-        } else if best.weight > least
-            && -others.ln() > odds
+        if best.weight > self.config.weight_min
+            && -others.ln() > self.places.odds
             && best.lead > self.config.lead_min
             && best.hits >= self.config.hits_min
         {

@@ -349,7 +349,7 @@ impl LikelihoodField {
     }
 }
 
-/// The greatest whole number not above: three times as fast as by way of `f64`, where processors have no rounding.
+/// The greatest whole number not above. `f64::floor` is a call where the processors built for need not round.
 fn floor(value: f64) -> i64 {
     let whole = value as i64;
     whole.saturating_sub(i64::from(value < whole as f64))

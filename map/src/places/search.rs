@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use super::field::{LikelihoodField, STEPS};
 use super::pyramid::LEVELS;
-use super::weigh::{fit_of_ends, posterior, refined, weighed};
+use super::weigh::{posterior, refined, weighed};
 use super::{Beam, Found, Place, View};
 use crate::geometry::{Level, Point, Pose, Robot, UncertainPose, difference};
 
@@ -68,7 +68,7 @@ type Turned = Vec<Vec<i64>>;
 /// The place close to a pose at which a look fits best.
 pub fn place_near(field: &LikelihoodField, view: &View, pose: &Pose<Level, Robot>) -> Place {
     let beams = thinned(&view.beams, field.config.beams_max);
-    weighed(field, &beams, &refined(field, &beams, *pose))
+    weighed(field, &beams, &refined(field, &beams, *pose).0)
 }
 
 /// Where the robot is if it is at this place, by all that the look shows: mean and covariance over the poses that count as
@@ -144,7 +144,7 @@ fn within(
     let is_near = |beam: &&Beam| beam.to.norm() <= config.search_range;
     let near: Vec<Beam> = beams.iter().filter(is_near).copied().collect();
     if near.is_empty() {
-        let rest = config.temper * config.elsewhere * beams.len() as f64;
+        let rest = config.fit(beams.len(), 0.0);
         return Found { places: Vec::new(), rest, blocks: 0 };
     }
     let parties = [0..likely.len(), likely.len()..likely.len() + others.len()];
@@ -156,7 +156,7 @@ fn within(
         near: near.len(),
         headings,
         turned,
-        floor: window.floor,
+        floor: f64::NEG_INFINITY,
         least: 1,
         best: f64::NEG_INFINITY,
         places: Vec::new(),
@@ -207,9 +207,9 @@ struct Search<'a> {
     near: usize,
     headings: Vec<f64>,
     turned: Vec<Turned>,
-    /// Places that fit less are of no interest.
+    /// Places that fit less do not matter.
     floor: f64,
-    /// What a block must come to, in steps.
+    /// What a block must come to for that, in steps.
     least: u32,
     /// How well the best place so far fits.
     best: f64,
@@ -234,7 +234,7 @@ impl Search<'_> {
                 || self.tried.len() >= config.tries_max
                 || self.places.len() >= config.places_max
             {
-                return self.fit_of(block.bound);
+                return self.fit_of(block.bound, self.near);
             }
             if self.is_known(&block) {
                 continue;
@@ -252,7 +252,7 @@ impl Search<'_> {
                 }
             }
         }
-        self.fit_of(self.least)
+        self.fit_of(self.least, self.near)
     }
 
     fn coarsest(&self, headings: Range<usize>, window: &Window) -> Blocks {
@@ -325,14 +325,13 @@ impl Search<'_> {
     fn weigh(&mut self, pose: Pose<Level, Robot>) {
         self.tried.push(pose);
         let config = &self.field.config;
-        let least = self.floor.max(self.best - config.odds - config.margin);
-        let refined = refined(self.field, self.beams, pose);
+        let (pose, ends) = refined(self.field, self.beams, pose);
         // What beams pass through can only cost.
-        if fit_of_ends(self.field, self.beams, &refined) < least {
+        if self.fit_of(ends, self.beams.len()) < self.floor {
             return;
         }
-        let place = weighed(self.field, self.beams, &refined);
-        if place.fit < least {
+        let place = weighed(self.field, self.beams, &pose);
+        if place.fit < self.floor {
             return;
         }
         if place.fit > self.best {
@@ -353,17 +352,17 @@ impl Search<'_> {
         }
     }
 
-    /// How well a place fits at most whose near beams' ends come to `steps`.
-    fn fit_of(&self, steps: u32) -> f64 {
-        let config = &self.field.config;
-        let most = f64::from(self.field.best) * self.near as f64;
+    /// How well a place fits at most if the ends of so many of the beams come to `steps`.
+    fn fit_of(&self, steps: u32, beams: usize) -> f64 {
+        let most = f64::from(self.field.best) * beams as f64;
         let cost = (most - f64::from(steps)) / STEPS;
-        config.temper * (config.elsewhere * self.beams.len() as f64 - cost)
+        self.field.config.fit(self.beams.len(), cost)
     }
 
     /// From now on only places matter that fit as well as this. Beams that are not searched with can only
     /// cost.
     fn raise(&mut self, fit: f64) {
+        self.floor = self.floor.max(fit);
         let config = &self.field.config;
         let cost = config.elsewhere * self.beams.len() as f64 - fit / config.temper;
         let most = f64::from(self.field.best) * self.near as f64;

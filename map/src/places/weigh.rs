@@ -22,12 +22,13 @@ fn ends(field: &LikelihoodField, beams: &[Beam], pose: &Pose<Level, Robot>) -> u
     beams.iter().map(|beam| u32::from(field.fit(&moved(&beam.to)))).sum()
 }
 
-/// The pose near `pose` at which the ends of beams fit best: downhill, coordinate by coordinate.
+/// The pose near `pose` at which the ends of beams fit best, and what they come to there, in steps: downhill, coordinate by
+/// coordinate.
 pub(super) fn refined(
     field: &LikelihoodField,
     beams: &[Beam],
     mut pose: Pose<Level, Robot>,
-) -> Pose<Level, Robot> {
+) -> (Pose<Level, Robot>, u32) {
     let mut best = ends(field, beams, &pose);
     let mut step = STEP;
     while step.0 > STEP_MIN {
@@ -45,7 +46,7 @@ pub(super) fn refined(
             step = (0.5 * step.0, 0.5 * step.1);
         }
     }
-    pose
+    (pose, best)
 }
 
 /// Steps to either side in which the posterior around a place is taken.
@@ -88,17 +89,6 @@ pub(super) fn posterior(
     }
 }
 
-/// How well a look fits a pose by the ends of its beams alone: at least as well as with all that they pass through.
-pub(super) fn fit_of_ends(
-    field: &LikelihoodField,
-    beams: &[Beam],
-    pose: &Pose<Level, Robot>,
-) -> f64 {
-    let count = beams.len() as f64;
-    let cost = (f64::from(field.best) * count - f64::from(ends(field, beams, pose))) / STEPS;
-    field.config.temper * (field.config.elsewhere * count - cost)
-}
-
 /// The place at a pose, with how well it fits.
 pub(super) fn weighed(field: &LikelihoodField, beams: &[Beam], pose: &Pose<Level, Robot>) -> Place {
     let config = &field.config;
@@ -131,7 +121,7 @@ pub(super) fn weighed(field: &LikelihoodField, beams: &[Beam], pose: &Pose<Level
     let covariance = covariance.unwrap_or_else(|| untold(field));
     Place {
         level_from_robot: UncertainPose { pose: *pose, covariance },
-        fit: config.temper * (config.elsewhere * count - cost),
+        fit: config.fit(beams.len(), cost),
         hits: hits / count.max(1.0),
         throughs: throughs / count.max(1.0),
         beams: beams.len(),
