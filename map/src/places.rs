@@ -14,6 +14,7 @@ mod field;
 mod headings;
 mod pyramid;
 mod search;
+mod sides;
 mod weigh;
 
 use crate::geometry::{Level, Point, Robot, UncertainPose};
@@ -76,6 +77,13 @@ pub struct PlacesConfig {
     /// What one costs that passes through a wall, besides, nat: glass, and walls grazed, are rarer than places that only
     /// resemble the right one.
     pub through_cost: f64,
+    /// The same of one that ends in the unknown behind it: what was never seen from here is behind a wall for good, nat.
+    pub through_unknown_cost: f64,
+    /// What one costs that ends on a wall of which only the other side is known, besides: thin walls have been seen from one
+    /// side, nat.
+    pub behind_cost: f64,
+    /// What one costs that ends on a wall which stands across the one that was hit, besides, nat.
+    pub across_cost: f64,
     /// Deviation of beams' ends from the cells of the walls that they hit, metres.
     pub spread: f64,
     /// What counts of a beam, as its neighbours err with it.
@@ -119,6 +127,9 @@ impl PlacesConfig {
         free_cost: 2.2,
         presumed_cost: 1.5,
         through_cost: 1.0,
+        through_unknown_cost: 3.5,
+        behind_cost: 0.5,
+        across_cost: 1.5,
         spread: 0.08,
         temper: 0.5,
         elsewhere: 0.9,

@@ -3,6 +3,7 @@
 use super::PlacesConfig;
 use super::headings::Directions;
 use super::pyramid::Pyramid;
+use super::sides::{Compared, NEAR_M, Sides};
 use crate::geometry::Point;
 use crate::level::LevelMap;
 use crate::raster::{
@@ -44,6 +45,8 @@ pub struct LikelihoodField {
     /// Fits of the cells of the tiles that are kept, in steps above the worst.
     fits: Vec<u8>,
     known: Vec<Known>,
+    /// The sides of walls near the cells.
+    sides: Vec<Sides>,
     /// The best fit.
     pub(crate) best: u8,
     pub(super) search: SearchField,
@@ -132,7 +135,8 @@ impl LikelihoodField {
         resolution: f64,
         config: &PlacesConfig,
     ) -> Self {
-        let directions = Directions::new(walls);
+        let walls: Vec<_> = walls.into_iter().collect();
+        let directions = Directions::new(walls.iter().copied());
         let span = |of: fn(&TileIndex) -> i32| {
             let low = tiles.iter().map(|t| of(&t.0)).min().unwrap_or(0);
             let high = tiles.iter().map(|t| of(&t.0)).max().unwrap_or(-1);
@@ -154,6 +158,7 @@ impl LikelihoodField {
             columns,
             slots,
             fits: Vec::new(),
+            sides: vec![Sides::default(); known.len()],
             known,
             best,
             search: SearchField {
@@ -169,6 +174,9 @@ impl LikelihoodField {
         field.bury();
         field.fits = field.known.iter().map(|known| fit(*known, best, config)).collect();
         field.soften();
+        for wall in &walls {
+            field.face(wall);
+        }
         field.search_field((columns, rows), has_rooms);
         field
     }
@@ -226,6 +234,34 @@ impl LikelihoodField {
                 }
             }
         }
+    }
+
+    /// Cells near a wall know which side of it is the free one.
+    fn face(&mut self, (from, to): &(Point, Point)) {
+        let length = (to - from).norm();
+        if length <= 0.0 {
+            return;
+        }
+        let along = (to - from) / length;
+        let left = Point::new(-along.y, along.x);
+        let side = Sides::facing(&left);
+        // No cell is stepped over.
+        let stride = 0.7 * self.resolution;
+        let steps = |way: f64| (way / stride).ceil() as u32;
+        for forth in 0..=steps(length + 2.0 * NEAR_M) {
+            let forth = f64::from(forth) * stride - NEAR_M;
+            for aside in 0..=steps(2.0 * NEAR_M) {
+                let aside = f64::from(aside) * stride - NEAR_M;
+                if let Some(at) = self.index_of(&(from + along * forth + left * aside)) {
+                    self.sides[at] = self.sides[at].with(side);
+                }
+            }
+        }
+    }
+
+    /// How the side of a wall that was hit at a place, and faces along a vector, compares with the walls that are known there.
+    pub(super) fn compared(&self, p: &Point, facing: &Point) -> Compared {
+        self.index_of(p).map_or(Compared::Agrees, |at| self.sides[at].compared(facing))
     }
 
     /// Where a cell, counted from the lower left tile, is kept.

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::field::{Known, LikelihoodField, STEPS};
+use super::sides::Compared;
 use super::{Beam, Place};
 use crate::geometry::{Covariance, Level, Point, Pose, Robot, UncertainPose};
 
@@ -98,10 +99,18 @@ pub(super) fn weighed(field: &LikelihoodField, beams: &[Beam], pose: &Pose<Level
         let (from, to) = (pose.act(&beam.from), pose.act(&beam.to));
         let of_end = f64::from(field.best - field.fit(&to).min(field.best)) / STEPS;
         cost += of_end;
-        if of_end < 0.75 * config.unknown_cost {
+        let is_hit = of_end < 0.75 * config.unknown_cost;
+        if is_hit {
             hits += 1.0;
             if let Some(normal) = beam.normal {
                 let normal = pose.act(&normal) - pose.position();
+                // The side that was seen faces the sensor.
+                let facing = if normal.dot(&(from - to)) < 0.0 { -normal } else { normal };
+                cost += match field.compared(&to, &facing) {
+                    Compared::Agrees => 0.0,
+                    Compared::Behind => config.behind_cost,
+                    Compared::Across => config.across_cost,
+                };
                 let arm = to - pose.position();
                 let row = Vector3::new(normal.x, normal.y, arm.perp(&normal));
                 information +=
@@ -110,7 +119,12 @@ pub(super) fn weighed(field: &LikelihoodField, beams: &[Beam], pose: &Pose<Level
         }
         if passes_through(field, &from, &to) {
             throughs += 1.0;
-            cost += config.through_cost;
+            let is_unknown = matches!(field.known(&to), Known::Nothing | Known::Unvisited);
+            cost += if is_unknown && !is_hit {
+                config.through_unknown_cost
+            } else {
+                config.through_cost
+            };
         }
     }
     let count = beams.len() as f64;
