@@ -94,7 +94,7 @@ pub struct PlacesConfig {
     pub spacing: f64,
     /// Longer beams are left out, metres.
     pub range_max: f64,
-    /// Longer beams are left out of the search, where a heading's error shows most, metres.
+    /// With longer beams only small blocks of the search are bounded, as a heading's error shows most there, metres.
     pub search_range: f64,
     /// Most beams that are weighed.
     pub beams_max: usize,
@@ -142,8 +142,8 @@ impl PlacesConfig {
         apart: (0.5, 0.3),
         below_chance: 4.0,
         places_max: 64,
-        blocks_max: 2_000_000,
-        tries_max: 6000,
+        blocks_max: 5_000_000,
+        tries_max: 20_000,
     };
     /// How well so many beams fit that cost so much in all, nat: above 0 if better than at a place that is not on the map.
     fn fit(&self, beams: usize, cost: f64) -> f64 {

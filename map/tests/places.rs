@@ -84,7 +84,7 @@ fn view(floor: &Floor, level_from_robot: &Pose<Level, Robot>) -> View {
     let robot_from_level = level_from_robot.inverse();
     for degrees in 0..360 {
         let (sin, cos) = f64::from(degrees).to_radians().sin_cos();
-        let steps = (1..1500).map(|i| f64::from(i) * 0.01);
+        let steps = (1..3000).map(|i| f64::from(i) * 0.01);
         let mut ends = steps.map(|t| Point::new(cos * t, sin * t));
         let to = ends.find(|p| !is_free(floor, &level_from_robot.act(p))).unwrap();
         view.add(Beam { from: Point::zeros(), to, normal: None }, &PlacesConfig::STANDARD);
@@ -139,18 +139,65 @@ fn walls_that_no_map_has_hide_no_place() {
 }
 
 #[test]
+fn a_hall_whose_walls_are_all_far_away_is_a_place_too() {
+    // Niches as wide as a robot tell its ends apart; all walls are farther off than what large blocks are bounded with.
+    let floor = vec![[0.0, 0.0, 44.0, 27.0], [3.0, 27.0, 9.0, 29.0], [44.0, 4.0, 46.5, 7.0]];
+    let field = field(&floor);
+    for truth in [Pose::new(20.0, 13.5, 0.4), Pose::new(26.0, 12.5, -2.6)] {
+        let view = view(&floor, &truth);
+        assert!(view.beams.iter().all(|b| b.to.norm() > PlacesConfig::STANDARD.search_range));
+        let found = search(&field, &view, &[]);
+        let best = found.places.first().unwrap();
+        assert!(is_at(&best.level_from_robot.pose, &truth), "{truth:?}: {best:?}");
+        assert!(found.rest < best.fit - 6.9 && found.places.len() == 1, "{truth:?}: {found:?}");
+    }
+}
+
+#[test]
+fn a_wall_that_turns_another_side_is_another_wall() {
+    // Its right wall, seen from inside; the same from outside, where nobody has been; and as if it stood across.
+    let field = field(&vec![[0.0, 0.0, 6.0, 4.0]]);
+    let fit = |x: f64, to: f64, normal: Point| {
+        let hit = |i| Beam {
+            from: Point::zeros(),
+            to: Point::new(to, f64::from(i) * 0.02 - 0.4),
+            normal: Some(normal),
+        };
+        let beams = (0..40).map(hit).collect();
+        let place = place_near(&field, &View { beams, walls: Vec::new() }, &Pose::new(x, 2.0, 0.0));
+        assert!(place.hits > 0.99 && place.throughs < 0.01, "{place:?}");
+        place.fit
+    };
+    let (along, across) = (Point::new(1.0, 0.0), Point::new(0.0, 1.0));
+    let [inside, outside] = [fit(4.0, 2.03, along), fit(8.0, -1.97, along)];
+    let config = PlacesConfig::STANDARD;
+    let cost = |a: f64, b: f64| (a - b) / (40.0 * config.temper);
+    assert!((cost(inside, outside) - config.behind_cost).abs() < 0.05, "{inside} {outside}");
+    assert!((fit(4.0, 2.03, -along) - inside).abs() < 1e-9, "a normal has no sign of its own");
+    let stands_across = fit(4.0, 2.03, across);
+    assert!((cost(inside, stands_across) - config.across_cost).abs() < 0.05, "{stands_across}");
+}
+
+#[test]
 fn what_is_seen_through_a_wall_costs_also_where_nothing_is_known_behind_it() {
     let room = vec![[0.0, 0.0, 6.0, 4.0]];
     let field = field(&room);
     let at = Pose::new(3.0, 2.0, 0.0);
-    let throughs = |x: f64, y: f64| {
+    let throughs_and_fit = |x: f64, y: f64| {
         let to = Point::new(x, y);
         let beams = vec![Beam { from: Point::zeros(), to, normal: None }; 40];
-        place_near(&field, &View { beams, walls: Vec::new() }, &at).throughs
+        place_near(&field, &View { beams, walls: Vec::new() }, &at)
     };
+    let fit = |x: f64, y: f64| throughs_and_fit(x, y).fit;
+    let throughs = |x: f64, y: f64| throughs_and_fit(x, y).throughs;
     assert!(throughs(0.0, 2.0) < 0.01, "ends on it");
     assert!(throughs(0.0, 2.3) < 0.01, "ranges err, and walls are thick");
     assert!(throughs(0.0, 4.0) > 0.99, "ends far behind it");
+    // Behind a wall nobody has ever seen anything from here: that weighs more than to end where nobody has been.
+    let config = PlacesConfig::STANDARD;
+    let costs = config.unknown_cost + config.through_unknown_cost;
+    let expected = 40.0 * config.temper * (config.elsewhere - costs);
+    assert!((fit(0.0, 4.0) - expected).abs() < 1.0, "{} {expected}", fit(0.0, 4.0));
 }
 
 #[test]

@@ -45,8 +45,8 @@ impl SeekerConfig {
         turn_min: 0.35,
         way_full: 1.5,
         turn_full: 1.0,
-        weight_min: 6.0,
-        lead_min: 6.9,
+        weight_min: 3.0,
+        lead_min: 6.0,
         apart_min: 2.0,
         hits_min: 0.55,
     };

@@ -3,6 +3,7 @@
 use super::PlacesConfig;
 use super::headings::Directions;
 use super::pyramid::Pyramid;
+use super::search::FAR_OFF_CELLS;
 use super::sides::{Compared, NEAR_M, Sides};
 use crate::geometry::Point;
 use crate::level::LevelMap;
@@ -365,7 +366,8 @@ impl LikelihoodField {
         search.size = (width, height);
         let corner = |tile: i32| f64::from(tile) * TILE_SIDE as f64 * self.resolution;
         search.corner = Point::new(corner(self.low.x), corner(self.low.y));
-        let reach = (self.config.search_range / search.cell).ceil() as usize + 1;
+        let reach =
+            (self.config.range_max / search.cell).ceil() as usize + FAR_OFF_CELLS as usize + 1;
         let outside = fit(Known::Nothing, self.best, &self.config);
         search.free_count = free.iter().map(|free| usize::from(*free)).sum();
         search.fits = Pyramid::new(&fits, search.size, outside, reach);

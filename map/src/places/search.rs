@@ -5,6 +5,7 @@
 //! block of one place is moved to where it fits best and weighed in full. The bound holds for what the ends of the beams come to
 //! on cells of the search, which forgive what is off by less than one of them.
 
+use std::collections::HashMap;
 use std::ops::Range;
 
 use super::field::{LikelihoodField, STEPS};
@@ -62,8 +63,45 @@ impl Blocks {
     }
 }
 
-/// The ends of beams at one heading, as offsets into each level of the field.
-type Turned = Vec<Vec<i64>>;
+/// By so many cells the end of a far beam may be off at the nearest of the headings that are searched: half a degree at
+/// 24 m; what is farther than that is forgiven with the cells around each end.
+pub(super) const FAR_OFF_CELLS: i32 = 2;
+/// The levels whose blocks hold all that is off by that from the places of a block: of a block of one place, of two to a side, and
+/// so on. Larger ones would have to be so large that they hold a wall anyway.
+const FAR_LEVELS: [usize; 4] = [2, 3, 3, 4];
+
+/// The ends of beams at one heading.
+struct Turned {
+    /// Of near beams, as offsets into each level of the field.
+    near: Vec<Vec<i64>>,
+    /// Of far beams: the lower left of the cells where they may end, from the robot's cell on.
+    far: Vec<(i32, i32)>,
+}
+
+/// Poses that were tried, by where they are.
+#[derive(Default)]
+struct Tried {
+    by_square: HashMap<(i32, i32), Vec<Pose<Level, Robot>>>,
+    count: usize,
+}
+
+impl Tried {
+    fn square(p: &Point) -> (i32, i32) {
+        ((p.x / TRIED.0).floor() as i32, (p.y / TRIED.0).floor() as i32)
+    }
+
+    fn add(&mut self, pose: Pose<Level, Robot>) {
+        self.count += 1;
+        self.by_square.entry(Self::square(&pose.position())).or_default().push(pose);
+    }
+
+    /// Those that may be as close to a place as poses are that would be moved to the same one.
+    fn near(&self, p: &Point) -> impl Iterator<Item = &Pose<Level, Robot>> {
+        let (x, y) = Self::square(p);
+        let squares = (-1..=1).flat_map(move |dy| (-1..=1).map(move |dx| (x + dx, y + dy)));
+        squares.filter_map(|square| self.by_square.get(&square)).flatten()
+    }
+}
 
 /// The place close to a pose at which a look fits best.
 pub fn place_near(field: &LikelihoodField, view: &View, pose: &Pose<Level, Robot>) -> Place {
@@ -141,26 +179,24 @@ fn within(
 ) -> Found {
     let config = &field.config;
     let beams = thinned(&view.beams, config.beams_max);
-    let is_near = |beam: &&Beam| beam.to.norm() <= config.search_range;
-    let near: Vec<Beam> = beams.iter().filter(is_near).copied().collect();
-    if near.is_empty() {
-        let rest = config.fit(beams.len(), 0.0);
-        return Found { places: Vec::new(), rest, blocks: 0 };
+    let (near, far): (Vec<Beam>, Vec<Beam>) =
+        beams.iter().partition(|beam| beam.to.norm() <= config.search_range);
+    if beams.is_empty() {
+        return Found { places: Vec::new(), rest: 0.0, blocks: 0 };
     }
     let parties = [0..likely.len(), likely.len()..likely.len() + others.len()];
     let headings = [likely, others].concat();
-    let turned = headings.iter().map(|heading| turned(field, &near, *heading)).collect();
+    let turned = headings.iter().map(|heading| turned(field, &near, &far, *heading)).collect();
     let mut search = Search {
         field,
         beams: &beams,
-        near: near.len(),
         headings,
         turned,
         floor: f64::NEG_INFINITY,
         least: 1,
         best: f64::NEG_INFINITY,
         places: Vec::new(),
-        tried: Vec::new(),
+        tried: Tried::default(),
         opened: 0,
     };
     search.raise(window.floor);
@@ -185,26 +221,26 @@ fn thinned(beams: &[Beam], most: usize) -> Vec<Beam> {
     (0..most).map(|i| beams[i * beams.len() / most]).collect()
 }
 
-fn turned(field: &LikelihoodField, beams: &[Beam], heading: f64) -> Turned {
+fn turned(field: &LikelihoodField, near: &[Beam], far: &[Beam], heading: f64) -> Turned {
     let (sin, cos) = heading.sin_cos();
     let cell = field.search.cell;
-    let ends: Vec<(i32, i32)> = beams
-        .iter()
-        .map(|Beam { to, .. }| {
-            let (x, y) = (cos * to.x - sin * to.y, sin * to.x + cos * to.y);
-            ((x / cell).round() as i32, (y / cell).round() as i32)
-        })
-        .collect();
+    let end = |Beam { to, .. }: &Beam| {
+        let (x, y) = (cos * to.x - sin * to.y, sin * to.x + cos * to.y);
+        ((x / cell).round() as i32, (y / cell).round() as i32)
+    };
+    let ends: Vec<(i32, i32)> = near.iter().map(end).collect();
     let of_level =
         |level| ends.iter().map(|(x, y)| field.search.fits.offset(level, *x, *y)).collect();
-    (0..LEVELS).map(of_level).collect()
+    let lower_left = |beam| {
+        let (x, y) = end(beam);
+        (x - FAR_OFF_CELLS, y - FAR_OFF_CELLS)
+    };
+    Turned { near: (0..LEVELS).map(of_level).collect(), far: far.iter().map(lower_left).collect() }
 }
 
 struct Search<'a> {
     field: &'a LikelihoodField,
     beams: &'a [Beam],
-    /// Beams that are searched with.
-    near: usize,
     headings: Vec<f64>,
     turned: Vec<Turned>,
     /// Places that fit less do not matter.
@@ -214,7 +250,7 @@ struct Search<'a> {
     /// How well the best place so far fits.
     best: f64,
     places: Vec<Place>,
-    tried: Vec<Pose<Level, Robot>>,
+    tried: Tried,
     /// Blocks that were looked into.
     opened: usize,
 }
@@ -231,10 +267,10 @@ impl Search<'_> {
             }
             self.opened += 1;
             if self.opened > config.blocks_max
-                || self.tried.len() >= config.tries_max
+                || self.tried.count >= config.tries_max
                 || self.places.len() >= config.places_max
             {
-                return self.fit_of(block.bound, self.near);
+                return self.fit_of(block.bound);
             }
             if self.is_known(&block) {
                 continue;
@@ -252,7 +288,7 @@ impl Search<'_> {
                 }
             }
         }
-        self.fit_of(self.least, self.near)
+        self.fit_of(self.least)
     }
 
     fn coarsest(&self, headings: Range<usize>, window: &Window) -> Blocks {
@@ -278,12 +314,23 @@ impl Search<'_> {
             return 0;
         }
         let place = field.fits.place(level, x, y);
-        let offsets = &self.turned[usize::from(heading)][level];
-        let (mut sum, mut left) = (0, offsets.len());
+        let Turned { near, far } = &self.turned[usize::from(heading)];
+        let offsets = &near[level];
+        // Far ones lose nothing, to begin with.
+        let (mut sum, mut left) = (far.len() as u32 * u32::from(self.field.best), offsets.len());
         for chunk in offsets.chunks(CHUNK) {
             sum += chunk.iter().map(|o| u32::from(field.fits.value(level, place + o))).sum::<u32>();
             left -= chunk.len();
             if sum + left as u32 * u32::from(self.field.best) < self.least {
+                return 0;
+            }
+        }
+        let Some(far_level) = FAR_LEVELS.get(level) else { return sum };
+        for (dx, dy) in far {
+            let end = field.fits.place(*far_level, x + dx, y + dy);
+            let fit = field.fits.value(*far_level, end);
+            sum -= u32::from(self.field.best.saturating_sub(fit));
+            if sum < self.least {
                 return 0;
             }
         }
@@ -318,16 +365,16 @@ impl Search<'_> {
         };
         let same = (0.8 * self.field.config.apart.0, SAME_HEADING);
         self.places.iter().any(|place| is_within(&place.level_from_robot.pose, same))
-            || (side < TRIED.0 && self.tried.iter().any(|pose| is_within(pose, TRIED)))
+            || (side < TRIED.0 && self.tried.near(&lower).any(|pose| is_within(pose, TRIED)))
     }
 
     /// Moves a pose to where it fits best and keeps it if it fits nearly as well as the best.
     fn weigh(&mut self, pose: Pose<Level, Robot>) {
-        self.tried.push(pose);
+        self.tried.add(pose);
         let config = &self.field.config;
         let (pose, ends) = refined(self.field, self.beams, pose);
         // What beams pass through can only cost.
-        if self.fit_of(ends, self.beams.len()) < self.floor {
+        if self.fit_of(ends) < self.floor {
             return;
         }
         let place = weighed(self.field, self.beams, &pose);
@@ -352,20 +399,20 @@ impl Search<'_> {
         }
     }
 
-    /// How well a place fits at most if the ends of so many of the beams come to `steps`.
-    fn fit_of(&self, steps: u32, beams: usize) -> f64 {
-        let most = f64::from(self.field.best) * beams as f64;
+    /// How well a place fits at most if the ends of the beams come to `steps`.
+    fn fit_of(&self, steps: u32) -> f64 {
+        let most = f64::from(self.field.best) * self.beams.len() as f64;
         let cost = (most - f64::from(steps)) / STEPS;
         self.field.config.fit(self.beams.len(), cost)
     }
 
-    /// From now on only places matter that fit as well as this. Beams that are not searched with can only
-    /// cost.
+    /// From now on only places matter that fit as well as this.
     fn raise(&mut self, fit: f64) {
         self.floor = self.floor.max(fit);
         let config = &self.field.config;
-        let cost = config.elsewhere * self.beams.len() as f64 - fit / config.temper;
-        let most = f64::from(self.field.best) * self.near as f64;
+        let count = self.beams.len() as f64;
+        let cost = config.elsewhere * count - fit / config.temper;
+        let most = f64::from(self.field.best) * count;
         self.least = self.least.max((most - STEPS * cost).max(0.0) as u32);
     }
 }
