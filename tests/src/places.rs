@@ -33,6 +33,8 @@ const REACH_M: f64 = 10.0;
 
 /// Of so many looks at most each is also asked for its place by itself.
 const SINGLE_MAX: usize = 300;
+/// Of so many looks at each of the other buildings at most each is asked for its place too.
+const STRANGERS_MAX: usize = 30;
 
 /// One scan of a log.
 pub(crate) struct Look {
@@ -174,6 +176,22 @@ impl<'a> Mapping<'a> {
         outcome
     }
 
+    /// Asks looks at other buildings for their places on this map.
+    fn strangers<'b>(
+        &self,
+        buildings: impl Iterator<Item = &'b [Look]>,
+        now: &dyn Fn() -> f64,
+    ) -> Answers {
+        let mut answers = Answers::default();
+        for looks in buildings {
+            let every = looks.len().div_ceil(STRANGERS_MAX).max(1);
+            for look in looks.iter().step_by(every) {
+                answers.ask_stranger(&self.field, &look.view, now);
+            }
+        }
+        answers
+    }
+
     /// Drives all parts of a log that do not make the map.
     fn drives(&self, now: &dyn Fn() -> f64) -> [Drives; 2] {
         let mut outcome = [Drives::default(), Drives::default()];
@@ -267,8 +285,8 @@ fn label(name: &str, mapped: Mapped, where_to: &str) -> Vec<String> {
     [name, mapped.in_words(), where_to].map(str::to_owned).to_vec()
 }
 
-/// Rewrites the tables `looks` and `on-plans` of a page, of single looks at logs and at plans of real buildings, and answers
-/// what is not as it must be. Further logs and plans are looked for in `data`.
+/// Rewrites the tables `looks`, `strange-looks` and `on-plans` of a page, of single looks at logs, at other buildings than the
+/// map's, and at plans of real buildings, and answers what is not as it must be. Further logs and plans are looked for in `data`.
 ///
 /// # Errors
 /// A log or the page cannot be read or written; the server that takes plans fails.
@@ -276,14 +294,24 @@ pub async fn single_looks(page: &Path, data: &Path) -> Result<Vec<String>, Error
     let started = tokio::time::Instant::now();
     let now = || started.elapsed().as_secs_f64();
     let on_plans::Asked { mut asked, mut wrong } = on_plans::table(page, data, &now).await?;
-    let mut rows = Vec::new();
-    for (name, path) in recorded(Some(data)) {
-        let looks = looks(&path)?;
+    let (mut rows, mut strangers) = (Vec::new(), Vec::new());
+    let buildings: Result<Vec<(String, Vec<Look>)>, Error> =
+        recorded(Some(data)).map(|(name, path)| Ok((name, looks(&path)?))).collect();
+    let buildings = buildings?;
+    for (name, looks) in &buildings {
         for mapped in [Mapped::OtherScans, Mapped::OtherBlocks, Mapped::FirstHalf] {
-            let both = Mapping::new(&looks, mapped).single(&now);
+            let mapping = Mapping::new(looks, mapped);
+            if mapped == Mapped::OtherScans {
+                let others = buildings.iter().filter(|(other, _)| other != name);
+                let answers = mapping.strangers(others.map(|(_, looks)| looks.as_slice()), &now);
+                strangers.push([vec![name.clone()], answers.strangers_row()].concat());
+                asked += answers.asked;
+                wrong += answers.wrong;
+            }
+            let both = mapping.single(&now);
             for (where_to, answers) in REACHES.into_iter().zip(&both) {
                 if answers.asked > 0 {
-                    rows.push([label(&name, mapped, where_to), answers.row()].concat());
+                    rows.push([label(name, mapped, where_to), answers.row()].concat());
                     report::say(&rows[rows.len() - 1].join(" | "));
                 }
                 asked += answers.asked;
@@ -293,6 +321,8 @@ pub async fn single_looks(page: &Path, data: &Path) -> Result<Vec<String>, Error
     }
     let header = [&LABEL[..], &Answers::HEADER].concat();
     report::rewrite(page, "looks", &report::table(&header, &rows))?;
+    let header = [&["map of"][..], &Answers::STRANGERS].concat();
+    report::rewrite(page, "strange-looks", &report::table(&header, &strangers))?;
     report::say(&format!("{wrong} of {asked} wrong"));
     let is_too_many = 1000 * wrong > asked;
     let words = || format!("{wrong} of {asked} were told a wrong place");

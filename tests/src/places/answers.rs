@@ -89,11 +89,7 @@ impl Answers {
         landmarks: usize,
         now: &dyn Fn() -> f64,
     ) -> Fix {
-        let started = now();
-        let mut seeker = Seeker::new(SeekerConfig::STANDARD, PlacesConfig::STANDARD);
-        let fix = seeker.seen(field, view, &[]);
-        self.milliseconds.push(1e3 * (now() - started));
-        self.asked += 1;
+        let fix = self.fix(field, view, now);
         let is_enough = landmarks >= ENOUGH;
         self.enough.0 += u32::from(is_enough);
         match &fix {
@@ -110,6 +106,36 @@ impl Answers {
             Fix::NoMatch => self.none += 1,
         }
         fix
+    }
+
+    /// Asks for the place of a look that was taken somewhere else: whatever is told is wrong.
+    pub(super) fn ask_stranger(
+        &mut self,
+        field: &LikelihoodField,
+        view: &View,
+        now: &dyn Fn() -> f64,
+    ) {
+        match self.fix(field, view, now) {
+            Fix::Unique(_) => self.wrong += 1,
+            Fix::Ambiguous(_) => self.ambiguous += 1,
+            Fix::NoMatch => self.none += 1,
+        }
+    }
+
+    fn fix(&mut self, field: &LikelihoodField, view: &View, now: &dyn Fn() -> f64) -> Fix {
+        let started = now();
+        let mut seeker = Seeker::new(SeekerConfig::STANDARD, PlacesConfig::STANDARD);
+        let fix = seeker.seen(field, view, &[]);
+        self.milliseconds.push(1e3 * (now() - started));
+        self.asked += 1;
+        fix
+    }
+
+    pub(super) const STRANGERS: [&str; 4] =
+        ["looks from elsewhere", "told", "ambiguous", "nothing"];
+
+    pub(super) fn strangers_row(&self) -> Vec<String> {
+        [self.asked, self.wrong, self.ambiguous, self.none].map(|n| n.to_string()).to_vec()
     }
 
     pub(super) fn row(&self) -> Vec<String> {
