@@ -142,7 +142,7 @@ impl PlacesConfig {
         apart: (0.5, 0.3),
         below_chance: 4.0,
         places_max: 64,
-        blocks_max: 5_000_000,
+        blocks_max: 2_000_000,
         tries_max: 20_000,
     };
     /// How well so many beams fit that cost so much in all, nat: above 0 if better than at a place that is not on the map.

@@ -306,6 +306,7 @@ pub async fn single_looks(page: &Path, data: &Path) -> Result<Vec<String>, Error
                 let others = buildings.iter().filter(|(other, _)| other != name);
                 let answers = mapping.strangers(others.map(|(_, looks)| looks.as_slice()), &now);
                 strangers.push([vec![name.clone()], answers.strangers_row()].concat());
+                report::say(&strangers[strangers.len() - 1].join(" | "));
                 asked += answers.asked;
                 wrong += answers.wrong;
             }
