@@ -416,3 +416,84 @@ impl Search<'_> {
         self.least = self.least.max((most - STEPS * cost).max(0.0) as u32);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::PlacesConfig;
+    use super::*;
+    use crate::raster::{TILE_CELLS, TILE_SIDE, Tile, TileIndex};
+
+    /// Cells of 5 cm, free but for walls here and there.
+    fn field(walls: &[(usize, usize)]) -> LikelihoodField {
+        let tiles = (0..12).flat_map(|x| (0..12).map(move |y| TileIndex { x, y }));
+        let tiles = tiles.map(|index| {
+            let mut cells = Box::new([-300; TILE_CELLS]);
+            for (column, row) in walls {
+                let tile = ((column / TILE_SIDE) as i32, (row / TILE_SIDE) as i32);
+                if tile == (index.x, index.y) {
+                    cells[row % TILE_SIDE * TILE_SIDE + column % TILE_SIDE] = 300;
+                }
+            }
+            (index, Tile::new(cells))
+        });
+        LikelihoodField::new(tiles, [], 0.05, &PlacesConfig::STANDARD)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn no_place_of_a_block_is_better_than_its_bound(
+            walls in prop::collection::vec((0..12 * TILE_SIDE, 0..12 * TILE_SIDE), 1..400),
+            beams in prop::collection::vec((0.5..20.0_f64, -3.1..3.1_f64), 1..40),
+            (x, y) in (0..300_i32, 0..300_i32),
+            (off_x, off_y, off_turn) in (0.0..1.0_f64, 0.0..1.0_f64, -0.5..0.5_f64),
+            degrees in 0..360_u32,
+        ) {
+            let field = field(&walls);
+            let beam = |(range, bearing): (f64, f64)| Beam {
+                from: Point::zeros(),
+                to: Point::new(range * bearing.cos(), range * bearing.sin()),
+                normal: None,
+            };
+            let beams: Vec<Beam> = beams.into_iter().map(beam).collect();
+            let (near, far): (Vec<Beam>, Vec<Beam>) =
+                beams.iter().partition(|beam| beam.to.norm() <= field.config.search_range);
+            let heading = f64::from(degrees).to_radians();
+            let search = Search {
+                field: &field,
+                beams: &beams,
+                headings: vec![heading],
+                turned: vec![turned(&field, &near, &far, heading)],
+                floor: f64::NEG_INFINITY,
+                least: 0,
+                best: f64::NEG_INFINITY,
+                places: Vec::new(),
+                tried: Tried::default(),
+                opened: 0,
+            };
+            for level in 0..LEVELS as u8 {
+                let side = 1 << level;
+                let (x, y) = (x / side * side, y / side * side);
+                let within = |at: i32, off: f64| at + (off * f64::from(side)) as i32;
+                let (x_in, y_in) = (within(x, off_x), within(y, off_y));
+                // On cells of the search; far ends as they are with a heading that is off by up to half a degree.
+                let fits = &field.search.fits;
+                let place = fits.place(0, x_in, y_in);
+                let of_near = search.turned[0].near[0].iter().map(|o| fits.value(0, place + o));
+                let (sin, cos) = (heading + off_turn.to_radians()).sin_cos();
+                let of_far = far.iter().map(|Beam { to, .. }| {
+                    let end = Point::new(cos * to.x - sin * to.y, sin * to.x + cos * to.y);
+                    let cell = |at: i32, end: f64| at + (end / field.search.cell).round() as i32;
+                    fits.value(0, fits.place(0, cell(x_in, end.x), cell(y_in, end.y)))
+                });
+                let most: u32 = of_near.chain(of_far).map(u32::from).sum();
+                let bound = search.bound(level, 0, x, y);
+                let can_stand = field.search.free.value(0, field.search.free.place(0, x_in, y_in)) > 0;
+                prop_assert!(!can_stand || bound >= most, "level {level}: {bound} for {most}");
+            }
+        }
+    }
+}
