@@ -183,13 +183,13 @@ fn what_is_seen_through_a_wall_costs_also_where_nothing_is_known_behind_it() {
     let room = vec![[0.0, 0.0, 6.0, 4.0]];
     let field = field(&room);
     let at = Pose::new(3.0, 2.0, 0.0);
-    let throughs_and_fit = |x: f64, y: f64| {
+    let place = |x: f64, y: f64| {
         let to = Point::new(x, y);
         let beams = vec![Beam { from: Point::zeros(), to, normal: None }; 40];
         place_near(&field, &View { beams, walls: Vec::new() }, &at)
     };
-    let fit = |x: f64, y: f64| throughs_and_fit(x, y).fit;
-    let throughs = |x: f64, y: f64| throughs_and_fit(x, y).throughs;
+    let fit = |x: f64, y: f64| place(x, y).fit;
+    let throughs = |x: f64, y: f64| place(x, y).throughs;
     assert!(throughs(0.0, 2.0) < 0.01, "ends on it");
     assert!(throughs(0.0, 2.3) < 0.01, "ranges err, and walls are thick");
     assert!(throughs(0.0, 4.0) > 0.99, "ends far behind it");

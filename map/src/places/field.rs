@@ -3,7 +3,6 @@
 use super::PlacesConfig;
 use super::headings::Directions;
 use super::pyramid::Pyramid;
-use super::search::FAR_OFF_CELLS;
 use super::sides::{Compared, NEAR_M, Sides};
 use crate::geometry::Point;
 use crate::level::LevelMap;
@@ -14,6 +13,9 @@ use crate::vector::Facing;
 
 /// Steps of a nat in which fits are counted.
 pub(crate) const STEPS: f64 = 20.0;
+/// By so many cells of the search the end of a far beam may be off at the nearest of the headings that are searched: half a
+/// degree at 22 m; what is farther than that is forgiven with the cells around each end.
+pub(super) const FAR_OFF_CELLS: i32 = 2;
 /// Most cells of the search: beyond, they are made larger.
 const CELLS_MAX: usize = 32_000_000;
 

@@ -8,7 +8,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use super::field::{LikelihoodField, STEPS};
+use super::field::{FAR_OFF_CELLS, LikelihoodField, STEPS};
 use super::pyramid::LEVELS;
 use super::weigh::{posterior, refined, weighed};
 use super::{Beam, Found, Place, View};
@@ -63,10 +63,7 @@ impl Blocks {
     }
 }
 
-/// By so many cells the end of a far beam may be off at the nearest of the headings that are searched: half a degree at
-/// 24 m; what is farther than that is forgiven with the cells around each end.
-pub(super) const FAR_OFF_CELLS: i32 = 2;
-/// The levels whose blocks hold all that is off by that from the places of a block: of a block of one place, of two to a side, and
+/// The levels whose blocks hold all that is off by [`FAR_OFF_CELLS`] from the places of a block: of a block of one place, of two to a side, and
 /// so on. Larger ones would have to be so large that they hold a wall anyway.
 const FAR_LEVELS: [usize; 4] = [2, 3, 3, 4];
 
@@ -179,11 +176,11 @@ fn within(
 ) -> Found {
     let config = &field.config;
     let beams = thinned(&view.beams, config.beams_max);
-    let (near, far): (Vec<Beam>, Vec<Beam>) =
-        beams.iter().partition(|beam| beam.to.norm() <= config.search_range);
     if beams.is_empty() {
         return Found { places: Vec::new(), rest: 0.0, blocks: 0 };
     }
+    let (near, far): (Vec<Beam>, Vec<Beam>) =
+        beams.iter().partition(|beam| beam.to.norm() <= config.search_range);
     let parties = [0..likely.len(), likely.len()..likely.len() + others.len()];
     let headings = [likely, others].concat();
     let turned = headings.iter().map(|heading| turned(field, &near, &far, *heading)).collect();
@@ -447,7 +444,7 @@ mod tests {
         #[test]
         fn no_place_of_a_block_is_better_than_its_bound(
             walls in prop::collection::vec((0..12 * TILE_SIDE, 0..12 * TILE_SIDE), 1..400),
-            beams in prop::collection::vec((0.5..20.0_f64, -3.1..3.1_f64), 1..40),
+            beams in prop::collection::vec((0.5..22.5_f64, -3.1..3.1_f64), 1..40),
             (x, y) in (0..300_i32, 0..300_i32),
             (off_x, off_y, off_turn) in (0.0..1.0_f64, 0.0..1.0_f64, -0.5..0.5_f64),
             degrees in 0..360_u32,
