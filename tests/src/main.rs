@@ -101,6 +101,9 @@ enum Command {
         /// The page with the markers `localization`, `kidnapped` and `selection`
         #[arg(long, value_name = "FILE")]
         report: PathBuf,
+        /// The seed of each row's first run; the page has those from 0 on
+        #[arg(long, value_name = "N", default_value_t = 0)]
+        first_seed: u64,
     },
     /// Lets robots that know nothing find their places on logs that are not in their maps
     Places {
@@ -194,7 +197,7 @@ async fn main() -> ExitCode {
         Command::Plans { report } => plans::table(&report),
         Command::Serving { report } => serving::tables(&report).await,
         Command::Structures { report } => structures::table(&report).await,
-        Command::Localization { report } => localization::tables(&report),
+        Command::Localization { report, first_seed } => localization::tables(&report, first_seed),
         Command::Places { report, data } => places::table(&report, data.as_deref()),
         Command::Looks { report, data } => places::single_looks(&report, &data).await,
         Command::Alignment { report, data } => alignment::table(&report, data.as_deref()),

@@ -6,7 +6,7 @@ use mapfold_tests::statistics::{mean, quantile};
 #[test]
 fn tracked_robots_are_where_they_say_that_they_are() {
     for setting in SETTINGS.iter().filter(|s| s.in_passing) {
-        let outcome = run(setting, 8).unwrap();
+        let outcome = run(setting, 0..8).unwrap();
         println!("{}: {:?}", setting.name, outcome.stops);
         // Of eight runs one may have slipped badly just before a stop.
         let (most, nees) = match setting.sensor {
@@ -23,7 +23,7 @@ fn tracked_robots_are_where_they_say_that_they_are() {
 fn robots_that_are_carried_away_notice_it_within_three_metres_and_find_themselves() {
     let tracked = SETTINGS.iter().filter(|s| s.in_passing && s.sensor == Sensor::Modern);
     for setting in tracked {
-        let outcome = kidnap(setting, 8).unwrap();
+        let outcome = kidnap(setting, 0..8).unwrap();
         assert_eq!((outcome.never_noticed, outcome.never_found, outcome.wrong), (0, 0, 0));
         assert!(quantile(&outcome.noticed, 1.0) <= 3.0, "{outcome:?}");
     }
