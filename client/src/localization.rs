@@ -37,8 +37,10 @@ mod filter;
 mod landmarks;
 mod lines;
 mod localizer;
+mod look;
 mod reference_walls;
 mod seeker;
+mod slips;
 mod sonar;
 #[cfg(test)]
 mod tests;
@@ -51,8 +53,10 @@ pub use filter::WallName;
 pub use localizer::{
     CheckConfig, KnownLevel, Localized, Localizer, LocalizerConfig, NOTHING_KNOWN,
 };
+pub use look::TrackReport;
 pub use reference_walls::{ReferenceWalls, ReferenceWallsConfig};
 pub use seeker::{Candidate, Fix, Seeker, SeekerConfig};
-pub use tracker::{TrackReport, Tracker, TrackerConfig};
+pub use slips::SlipConfig;
+pub use tracker::{Tracker, TrackerConfig};
 pub use view::view;
 pub use watchdog::{Lost, Tracking, WatchdogConfig};

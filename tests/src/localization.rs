@@ -367,10 +367,7 @@ pub fn faults_of(setting: &Setting, outcome: &Outcome) -> Vec<String> {
         Sensor::Infrared if setting.in_passing => {
             at_most("p95 of the worst stop", quantile(&outcome.stops, 0.95), 0.06);
             at_most("p95 between stops", quantile(&outcome.moments, 0.95), 0.08);
-            // A wheel that slips by 20 cm on the way to a stop where no wall lies across is not noticed there.
-            if !setting.bad_slips {
-                at_most("the worst stop", quantile(&outcome.stops, 1.0), 0.12);
-            }
+            at_most("the worst stop", quantile(&outcome.stops, 1.0), 0.12);
         }
         Sensor::Modern => at_most("p95 of the worst stop", quantile(&outcome.stops, 0.95), 0.02),
         // Between stops 1.67 m apart, the head often sees no wall across the hallway; sonars never notice a slip:

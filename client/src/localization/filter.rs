@@ -81,7 +81,10 @@ pub(super) fn apart_sq(a: &UncertainPose<Level, Robot>, b: &UncertainPose<Level,
 }
 
 /// From one pose to another, component by component.
-fn step_to(from: &UncertainPose<Level, Robot>, to: &UncertainPose<Level, Robot>) -> Vector3<f64> {
+pub(super) fn step_to(
+    from: &UncertainPose<Level, Robot>,
+    to: &UncertainPose<Level, Robot>,
+) -> Vector3<f64> {
     let (from, to) = (&from.pose, &to.pose);
     let turn = difference(to.heading(), from.heading());
     Vector3::new(to.x - from.x, to.y - from.y, turn)
