@@ -51,7 +51,7 @@ pub(super) struct Opinions {
 
 impl Opinions {
     pub(super) fn new(fix: UncertainPose<Level, Robot>) -> Self {
-        Self { without: Filter::new(fix), with: None, way: 0.0, claimed: fix }
+        Self::of(Filter::new(fix))
     }
 
     /// Mean and covariance of both.
@@ -85,12 +85,12 @@ impl Opinions {
         config: &SlipConfig,
         mut take: impl FnMut(&mut Filter) -> (T, f64),
     ) -> (T, bool) {
-        let (mut with, before) = self.branched(config);
+        let branched = self.branched(config);
         let (looked, evidence) = take(&mut self.without);
-        if before <= 0.0 {
+        let Some((mut with, before)) = branched else {
             self.claim();
             return (looked, false);
-        }
+        };
         let (of_slipped, evidence_of_slipped) = take(&mut with);
         let odds = (before / (1.0 - before)).ln() + evidence_of_slipped - evidence;
         let share = 1.0 / (1.0 + (-odds).exp());
@@ -104,18 +104,19 @@ impl Opinions {
         (if is_open && share > 0.5 { of_slipped } else { looked }, false)
     }
 
-    /// What it is if something has slipped, on the way until now or before, and how probable that is. Of an earlier slip and
-    /// one since the last look, the likelier is kept.
-    fn branched(&mut self, config: &SlipConfig) -> (Filter, f64) {
+    /// What it is if something has slipped, on the way until now or before, and how probable that is; `None` if nothing can
+    /// have. Of an earlier slip and one since the last look, the likelier is kept.
+    fn branched(&mut self, config: &SlipConfig) -> Option<(Filter, f64)> {
         let slips = 1.0 - (-config.per_metre * std::mem::take(&mut self.way)).exp();
         let before = self.with.as_ref().map_or(0.0, |(_, share)| *share);
         let anew = (1.0 - before) * slips;
         match self.with.take() {
-            Some((with, _)) if before >= anew => (with, before + anew),
+            Some((with, _)) if before >= anew => Some((with, before + anew)),
+            _ if anew <= 0.0 => None,
             _ => {
                 let mut with = self.without.clone();
                 with.slip(&config.sd);
-                (with, anew)
+                Some((with, anew))
             }
         }
     }

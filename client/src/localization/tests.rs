@@ -302,22 +302,35 @@ fn a_corridor_that_fits_proves_nothing_along_itself() {
     assert_eq!(tracker.state(), Tracking::Lost(Lost::Contradicted));
 }
 
-#[test]
-fn a_bad_slip_is_believed_if_it_explains_more_and_so_is_one_soon_after() {
-    let walls = [
+/// A corridor whose end has a step: two walls along it, two across.
+fn stepped_corridor() -> [Wall; 4] {
+    [
         Wall::new((9.0, 1.0), (0.0, 1.0)),
         Wall::new((0.0, -1.0), (9.0, -1.0)),
         Wall::new((9.0, -1.0), (9.0, 0.0)),
         Wall::new((9.5, 0.0), (9.5, 1.0)),
-    ];
+    ]
+}
+
+/// A robot in it that knows that it is at `x`.
+fn put_into_corridor(x: f64) -> Tracker {
+    let start = fix(Pose::new(x, 0.0, 0.0), [0.01, 0.01, 0.005]);
+    Tracker::new(start, TrackerConfig::STANDARD)
+}
+
+/// All of some walls, seen from `x` along a corridor.
+fn seen_from(x: f64, walls: &[Wall]) -> Vec<ObservedSegment> {
+    let truth = Pose::new(x, 0.0, 0.0);
+    walls.iter().map(|w| w.seen(&truth, (0.0, 0.0), [1e-4, 1e-5])).collect()
+}
+
+#[test]
+fn a_bad_slip_is_believed_if_it_explains_more_and_so_is_one_soon_after() {
+    let walls = stepped_corridor();
     let reference = known(&walls);
-    let start = fix(Pose::new(2.0, 0.0, 0.0), [0.01, 0.01, 0.005]);
-    let mut tracker = Tracker::new(start, TrackerConfig::STANDARD);
-    let look = |tracker: &mut Tracker, x: f64| {
-        let truth = Pose::new(x, 0.0, 0.0);
-        let seen: Vec<_> = walls.iter().map(|w| w.seen(&truth, (0.0, 0.0), [1e-4, 1e-5])).collect();
-        tracker.seen(&seen, &reference, None)
-    };
+    let mut tracker = put_into_corridor(2.0);
+    let look =
+        |tracker: &mut Tracker, x: f64| tracker.seen(&seen_from(x, &walls), &reference, None);
     // The wheels count half a metre and roll 30 cm.
     tracker.moved(&Pose::new(0.5, 0.0, 0.0));
     let report = look(&mut tracker, 2.3);
@@ -332,30 +345,17 @@ fn a_bad_slip_is_believed_if_it_explains_more_and_so_is_one_soon_after() {
 
 #[test]
 fn a_thing_that_was_moved_is_no_slip_while_another_stands_where_it_was() {
-    let walls = [
-        Wall::new((9.0, 1.0), (0.0, 1.0)),
-        Wall::new((0.0, -1.0), (9.0, -1.0)),
-        Wall::new((9.0, -1.0), (9.0, 0.0)),
-        Wall::new((9.5, 0.0), (9.5, 1.0)),
-    ];
-    let stands = [
-        walls[0],
-        walls[1],
-        Wall::new((8.85, -1.0), (8.85, 0.0)),
-        Wall::new((9.5, 0.0), (9.5, 1.0)),
-    ];
+    let walls = stepped_corridor();
+    let stands = [walls[0], walls[1], Wall::new((8.85, -1.0), (8.85, 0.0)), walls[3]];
     let reference = known(&walls);
-    let start = fix(Pose::new(2.0, 0.0, 0.0), [0.01, 0.01, 0.005]);
-    let mut tracker = Tracker::new(start, TrackerConfig::STANDARD);
+    let mut tracker = put_into_corridor(2.0);
     for n in 1..=10 {
         tracker.moved(&Pose::new(0.3, 0.0, 0.0));
-        let truth = Pose::new(2.0 + 0.3 * f64::from(n), 0.0, 0.0);
-        let seen: Vec<_> =
-            stands.iter().map(|w| w.seen(&truth, (0.0, 0.0), [1e-4, 1e-5])).collect();
-        let report = tracker.seen(&seen, &reference, None);
+        let x = 2.0 + 0.3 * f64::from(n);
+        let report = tracker.seen(&seen_from(x, &stands), &reference, None);
         assert!(!report.slipped && report.refused == 1, "{n}: {report:?}");
         let claimed = tracked(&tracker);
-        let off = (claimed.pose.x - truth.x).abs();
+        let off = (claimed.pose.x - x).abs();
         assert!(off < 0.02 && off < 3.0 * claimed.covariance.sd(0), "{n}: {claimed:?}");
     }
 }
